@@ -99,9 +99,6 @@ class Evaluate:
     texture: Union[Mapping[str, Any], None] = None
     """What texture values are of, besides λs and λc."""
 
-    uncertainty: Union[Union[Literal['linear'], Literal['monte-carlo']], None] = None
-    """How the errors of a profile become those of its roundness values; without it `linear`."""
-
     values: Union[Union[Literal['all'], Sequence[Union[Literal['roundness'], Literal['harmonics'], Literal['straightness'], Literal['texture'], Literal['cylindricity'], Literal['areal'], Literal['twist'], Literal['error-motion']]]], None] = None
     """Groups of values, or "all"; without it `roundness`, `straightness`, `texture`, `cylindricity` and `error-motion`, as far as
     what the separator offers gives them. Of "all", what a run cannot give (areal values and twist of a single section) is left

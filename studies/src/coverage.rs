@@ -3,12 +3,12 @@
 use std::fmt::Write;
 
 use runout_core::{
-    Complex64, Error, Result,
+    Complex64, Error, Result, draws,
     measurement::StationTruth,
     numerics::fourier::Fourier,
     separation::{Quantity, Separation},
     stage::StationSeparator,
-    standards::{roundness::ront_lsci_um, texture::ra_um, uncertainty},
+    standards::{roundness::ront_lsci_um, texture::ra_um},
 };
 use runout_spindle::{
     separators::{HarmonicLeastSquares, Weighting},
@@ -199,7 +199,7 @@ fn sizes(separation: &Separation, unknown: usize, truth_um: &[f64], rows: &mut V
     let values = |profile: &[f64]| [ront_lsci_um(profile), ra_um(profile)];
     // Any seed that is another one for another form.
     let seed = form_um.first().map_or(0, |value| value.to_bits());
-    let Some(found) = uncertainty::monte_carlo(&form_um, &variance, seed, values) else { return };
+    let Some(found) = draws::monte_carlo(&form_um, &variance, seed, values) else { return };
     for (index, name) in ["RONt", "Ra"].into_iter().enumerate() {
         let (truth, value) = (values(truth_um)[index], values(&form_um)[index]);
         let [low, high] = found[index].interval_95;

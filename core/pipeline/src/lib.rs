@@ -28,6 +28,7 @@ pub mod summary;
 
 pub use runout_closed_loop as model;
 pub use runout_consistency as consistency;
+pub use runout_draws as draws;
 pub use runout_error::{Error, ErrorKind, Result, fault};
 pub use runout_numerics::{self as numerics, Complex64};
 pub use runout_standards as standards;

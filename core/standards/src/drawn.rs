@@ -9,7 +9,7 @@
 //! Where b is large against s, the interval depends on how well t̂ resembles t, which no recording shows: such a value has no
 //! interval, but the reason why.
 
-use super::uncertainty::Uncertainty;
+use runout_draws::Uncertainty;
 use runout_numerics::{
     Complex64,
     lanes::product,

@@ -4,13 +4,8 @@ pub mod areal;
 pub mod control_chart;
 pub mod cylindricity;
 pub mod drawn;
-mod drawn_angles;
-mod errors;
-mod errors_at;
 mod extremes;
 pub mod gaps;
-mod likely;
-pub mod mean_deviation;
 mod near;
 pub mod open_errors;
 pub mod parameter;
@@ -18,12 +13,11 @@ pub mod position;
 pub mod reference;
 pub mod roundness;
 pub mod slope;
-mod stand_in;
 pub mod straightness;
 pub mod texture;
 pub mod twist;
-pub mod uncertainty;
 
+use runout_draws::Uncertainty;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -57,10 +51,13 @@ pub struct Value {
     /// Share of the profile or surface that was there; gaps are left out.
     pub coverage: f64,
     /// From the covariance of the separation; null where none is known.
-    pub uncertainty: Option<uncertainty::Uncertainty>,
+    pub uncertainty: Option<Uncertainty>,
     /// Why no uncertainty is stated, where the errors are known and intervals by them do not hold; null otherwise.
     #[serde(default)]
     pub no_uncertainty: Option<String>,
+    /// By how much noise has raised it, where that is more than its standard uncertainty; null otherwise. The interval is without it.
+    #[serde(default)]
+    pub raised_by_noise: Option<f64>,
     /// What of its own data refutes it: then its uncertainty is widened to what is left unexplained, and no limit is kept by it; null
     /// otherwise.
     #[serde(default)]

@@ -44,50 +44,6 @@ impl Near {
     }
 }
 
-/// Points of a profile by height: with errors added, the highest is among the first.
-#[derive(Debug, Clone)]
-pub(super) struct Ranked {
-    /// Heights and places of the highest points, descending.
-    first: Vec<(f64, u32)>,
-    /// Whether these are all that there are.
-    all: bool,
-}
-
-/// Points that are ranked, at most.
-const RANKED: usize = 256;
-
-impl Ranked {
-    /// Of heights, of which missing ones are NaN.
-    pub(crate) fn new(heights: impl Iterator<Item = f64>) -> Self {
-        let there = heights.zip(0..).filter(|(height, _)| !height.is_nan());
-        let mut first: Vec<(f64, u32)> = there.collect();
-        let descending = |a: &(f64, u32), b: &(f64, u32)| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1));
-        let all = first.len() <= RANKED;
-        if !all {
-            first.select_nth_unstable_by(RANKED, descending);
-            first.truncate(RANKED);
-        }
-        first.sort_unstable_by(descending);
-        Self { first, all }
-    }
-
-    /// The highest of `disturbed` heights, none of which is above its own by more than `largest`, and its place. `None`
-    /// where points that are not ranked could be higher, or there is none.
-    pub(crate) fn highest(&self, largest: f64, disturbed: impl Fn(usize) -> f64) -> Option<(f64, usize)> {
-        let (mut best, mut place) = (f64::NEG_INFINITY, None);
-        for (height, point) in &self.first {
-            if height + largest < best {
-                return place.map(|place| (best, place));
-            }
-            let found = disturbed(*point as usize);
-            if found > best {
-                (best, place) = (found, Some(*point as usize));
-            }
-        }
-        place.filter(|_| self.all).map(|place| (best, place))
-    }
-}
-
 /// What deviations come to.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Course {
@@ -131,55 +87,45 @@ impl Course {
 
     /// Of drawn values less what they are above their deviations; none is missing.
     pub(crate) fn less(drawn: &[f64], offset: &[f64]) -> Self {
-        vectorised(Sums { first: drawn, parts: [offset, &[]], sign: -1.0 })
-    }
-
-    /// Of deviations with errors added, the first ones and the others; none is missing.
-    pub(crate) fn with_errors(deviations: &[f64], errors: [&[f64]; 2]) -> Self {
-        vectorised(Sums { first: deviations, parts: errors, sign: 1.0 })
+        vectorised(Differences { drawn, offset })
     }
 }
 
-/// A profile and another one in two parts, with a sign. Monte Carlo asks for the course of both together many thousand times.
-struct Sums<'a> {
-    first: &'a [f64],
-    parts: [&'a [f64]; 2],
-    sign: f64,
+/// A profile less another one. Draws ask for its course many thousand times.
+struct Differences<'a> {
+    drawn: &'a [f64],
+    offset: &'a [f64],
 }
 
-impl NullaryFnOnce for Sums<'_> {
+impl NullaryFnOnce for Differences<'_> {
     type Output = Course;
 
     #[inline(always)]
     fn call(self) -> Course {
-        let Self { first, parts, sign } = self;
+        let Self { drawn, offset } = self;
         let (mut low, mut high, mut squares) = ([f64::INFINITY; LANES], [f64::NEG_INFINITY; LANES], [0.0; LANES]);
         let (mut rest_low, mut rest_high, mut rest_squares) = (f64::INFINITY, f64::NEG_INFINITY, 0.0);
-        let mut done = 0;
-        for part in parts {
-            let first = &first[done..done + part.len()];
-            let whole = part.len() - part.len() % LANES;
-            for offset in (0..whole).step_by(LANES) {
-                let [first, second]: [[f64; LANES]; 2] = [load(first, offset), load(part, offset)];
-                for lane in 0..LANES {
-                    let sum = first[lane] + sign * second[lane];
-                    low[lane] = if sum < low[lane] { sum } else { low[lane] };
-                    high[lane] = if sum > high[lane] { sum } else { high[lane] };
-                    squares[lane] += sum * sum;
-                }
+        let points = drawn.len().min(offset.len());
+        let whole = points - points % LANES;
+        for place in (0..whole).step_by(LANES) {
+            let [drawn, offset]: [[f64; LANES]; 2] = [load(drawn, place), load(offset, place)];
+            for lane in 0..LANES {
+                let deviation = drawn[lane] - offset[lane];
+                low[lane] = if deviation < low[lane] { deviation } else { low[lane] };
+                high[lane] = if deviation > high[lane] { deviation } else { high[lane] };
+                squares[lane] += deviation * deviation;
             }
-            for (first, second) in first[whole..].iter().zip(&part[whole..]) {
-                let sum = first + sign * second;
-                (rest_low, rest_high) = (rest_low.min(sum), rest_high.max(sum));
-                rest_squares += sum * sum;
-            }
-            done += part.len();
+        }
+        for (drawn, offset) in drawn[whole..points].iter().zip(&offset[whole..points]) {
+            let deviation = drawn - offset;
+            (rest_low, rest_high) = (rest_low.min(deviation), rest_high.max(deviation));
+            rest_squares += deviation * deviation;
         }
         Course {
             low: rest_low.min(folded(low, f64::min)),
             high: rest_high.max(folded(high, f64::max)),
             squares: rest_squares + folded(squares, |one, other| one + other),
-            points: done,
+            points,
         }
     }
 }

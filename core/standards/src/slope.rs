@@ -2,7 +2,6 @@
 
 use std::{borrow::Cow, f64::consts::TAU};
 
-use super::{near::Ranked, uncertainty::DrawnErrors};
 use crate::gaps::Gaps;
 use runout_numerics::{
     Complex64,
@@ -91,58 +90,6 @@ fn peak_near(curve: &Curve, start: f64, step: f64) -> f64 {
     angle
 }
 
-/// Slopes on equal angles to which errors are added: of each draw the largest |dr/dα|, with a parabola through the three
-/// angles about it.
-pub struct Drawn<'a> {
-    slopes: &'a [f64],
-    ranked: Ranked,
-}
-
-impl<'a> Drawn<'a> {
-    /// About slopes, of which missing ones are NaN.
-    #[must_use]
-    pub fn about(slopes: &'a [f64]) -> Self {
-        Self { slopes, ranked: Ranked::new(slopes.iter().map(|slope| slope.abs())) }
-    }
-
-    /// Of the slopes with errors added.
-    #[must_use]
-    pub fn steepest(&self, errors: &DrawnErrors) -> f64 {
-        let size = |point: usize| (self.slopes[point] + errors.at(point)).abs();
-        match self.ranked.highest(errors.largest_um(), size) {
-            Some((peak, place)) => with_parabola(place, peak, self.slopes.len(), size),
-            None => with_errors(self.slopes, size),
-        }
-    }
-
-    /// Of the slopes themselves.
-    #[must_use]
-    pub fn undisturbed(&self) -> f64 {
-        with_errors(self.slopes, |point| self.slopes[point].abs())
-    }
-}
-
-/// The largest of all sizes, with its parabola.
-fn with_errors(slopes: &[f64], size: impl Fn(usize) -> f64) -> f64 {
-    let (index, peak) = (0..slopes.len()).fold((0, f64::NAN), |best, index| {
-        let size = size(index);
-        if size > best.1 || (best.1.is_nan() && !size.is_nan()) { (index, size) } else { best }
-    });
-    with_parabola(index, peak, slopes.len(), size)
-}
-
-/// The top of the parabola through a peak and both of its neighbours.
-fn with_parabola(index: usize, peak: f64, count: usize, size: impl Fn(usize) -> f64) -> f64 {
-    let beside = |step: usize| size((index + step) % count);
-    if count < 3 || peak.is_nan() {
-        return peak;
-    }
-    let [before, after] = [beside(count - 1), beside(1)];
-    let bend = 2.0 * peak - before - after;
-    // At a gap's end there is no parabola.
-    if bend > 0.0 { peak + (after - before).powi(2) / (8.0 * bend) } else { peak }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -180,31 +127,5 @@ mod tests {
         all.add(0.0, TAU);
         assert!(steepest_um_per_rad(&series(&waves, 255), &all).is_finite(), "its two ends");
         assert!(steepest_um_per_rad(&series(&[], 5), &whole).abs() < 1e-300);
-    }
-
-    #[test]
-    fn a_parabola_meets_a_peak_between_angles() {
-        let slopes: Vec<f64> = (0..16).map(|step| (TAU * (f64::from(step) - 0.4) / 16.0).cos()).collect();
-        assert!((Drawn::about(&slopes).undisturbed() - 1.0).abs() < 1e-3);
-        assert!(Drawn::about(&[f64::NAN; 4]).undisturbed().is_nan());
-        assert!((Drawn::about(&[f64::NAN, -2.0, 1.0]).undisturbed() - 2.0).abs() < 1e-15);
-    }
-
-    /// Ranks leave nothing out, however large errors are beside the slopes.
-    #[test]
-    #[allow(clippy::float_cmp, reason = "the same operations")]
-    fn ranked_slopes_give_the_largest_of_all() {
-        let wave = |point: usize, phase: f64| (0.37 * point as f64 + phase).sin() + (1.7 * point as f64 * phase).cos();
-        for count in [50, 2000] {
-            let mut slopes: Vec<f64> = (0..count).map(|point| wave(point, 0.3)).collect();
-            slopes[10..20].fill(f64::NAN);
-            let drawn = Drawn::about(&slopes);
-            for (draw, size) in (1..60).zip([1e-3, 0.1, 1.0, 30.0].into_iter().cycle()) {
-                let errors: Vec<f64> = (0..count).map(|point| size * wave(point, 0.7 * f64::from(draw))).collect();
-                let both: Vec<f64> = slopes.iter().zip(&errors).map(|(slope, error)| slope + error).collect();
-                let expected = Drawn::about(&both).undisturbed();
-                assert_eq!(drawn.steepest(&DrawnErrors::new(&errors)), expected, "{count} {draw}");
-            }
-        }
     }
 }

@@ -7,8 +7,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::profile::Profile;
+use runout_draws::{DRAWS, Errors, TURNS_OF_A_DRAW, monte_carlo_of, seed};
 use runout_numerics::{Complex64, fourier::Fourier};
-use runout_standards::uncertainty::{DRAWS, Errors, TURNS_OF_A_DRAW, monte_carlo_of, seed};
 
 /// Points a wave of the highest order: a crest between two of them is at most 2 % of that order's amplitude higher.
 const POINTS_A_WAVE: usize = 16;

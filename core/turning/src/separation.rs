@@ -5,11 +5,9 @@ mod quantity;
 pub use crate::residual::{OrderResidual, ReadingResidual, Residual};
 use crate::{azimuth::Azimuth, smoothing::orders_beside};
 pub use quantity::{ALONG_COLUMN, MotionColumn, Quantity, motion_columns};
+use runout_draws::{NORMAL_95, student_95};
 use runout_numerics::Complex64;
-use runout_standards::{
-    gaps::Gaps,
-    uncertainty::{NORMAL_95, student_95},
-};
+use runout_standards::gaps::Gaps;
 
 /// What the numbers of form, motion and harmonics are, for files that explain themselves.
 pub const CONVENTION: &str = "Form is Re sum c exp(+i n alpha) over the part's angle alpha, outward positive; motion is \

@@ -9,10 +9,11 @@ use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use runout_core::{
     Complex64,
     atomic_file::commit_all,
+    draws::Uncertainty,
     pipeline::{Context, StageConfig, run::StationTables},
     provenance::{Input, Provenance},
     separation::{Quantity, Residual, SectionAt, Separation},
-    standards::{Value, uncertainty::Uncertainty},
+    standards::Value,
     station::StationResult,
     summary::{LostOrders, PartSummary, SectionSummary, StationSummary, Summary},
 };
@@ -269,6 +270,7 @@ fn values_are_rows_and_null_where_there_is_none() {
         weakened_above_upr: None,
         absent_above_upr: None,
         no_uncertainty: None,
+        raised_by_noise: None,
         refuted_by: None,
         filter: "Gaussian 50 UPR".into(),
         reference: "MZCI".into(),

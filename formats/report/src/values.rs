@@ -115,10 +115,11 @@ fn rows(summary: &Summary) -> Vec<Row> {
             interval: uncertainty.map_or_else(String::new, |known| interval((known.interval_95, known.std))),
             refers: [value.reference.as_str(), value.filter.as_str()].join(", "),
             about: format!(
-                "{}; {} to {} UPR{lacks}{}",
+                "{}; {} to {} UPR{lacks}{}{}",
                 value.source,
                 value.band_upr[0],
                 value.band_upr[1],
+                value.raised_by_noise.map_or_else(String::new, |by| format!("; noise raises it by {by:.2e}")),
                 reason(value.refuted_by.as_ref())
             ),
         }

@@ -92,7 +92,7 @@ fn values_are_those_of_the_simulated_motion() {
         run(&campaign(1, "noise_um = 1e-4"), &format!("{THREE_BALLS}std_um = 1e-3"), &format!("{ONLY}{limits}"));
     for (symbol, truth) in truths() {
         let value = found.values.iter().find(|value| value.symbol == symbol).unwrap();
-        assert!((value.value.unwrap() - truth).abs() < 2e-3 * truth.max(1.0), "{symbol}: {value:?} instead of {truth}");
+        assert!((value.value.unwrap() - truth).abs() < 5e-3 * truth.max(1.0), "{symbol}: {value:?} instead of {truth}");
         assert!(value.of.as_deref() == Some("C") && value.interval_95.is_some(), "{value:?}");
     }
     let decisions: Vec<Decision> = found.limits.iter().map(|limit| limit.decision).collect();

@@ -1,6 +1,7 @@
 use insta::assert_snapshot;
 use runout_core::{
-    standards::{Value, uncertainty::Uncertainty},
+    draws::Uncertainty,
+    standards::Value,
     summary::{
         CaptureSummary, LostOrders, MotionTruth, RejectedTurnSummary, SectionSummary, StationSummary, Summary,
         SurfaceSummary,
@@ -34,6 +35,7 @@ fn section(id: &str, z_mm: f64) -> SectionSummary {
         weakened_above_upr: None,
         absent_above_upr: None,
         no_uncertainty: None,
+        raised_by_noise: None,
         refuted_by: None,
         filter: "none".into(),
         reference: "LSCI".into(),
@@ -65,6 +67,7 @@ fn motion_values(size: f64) -> Vec<Value> {
         weakened_above_upr: None,
         absent_above_upr: None,
         no_uncertainty: None,
+        raised_by_noise: None,
         refuted_by: None,
         filter: "none".into(),
         reference: reference.into(),

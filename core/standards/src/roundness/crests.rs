@@ -2,7 +2,11 @@
 //! through them. At six angles a wave, what is left of a crest's error is at most 2.6 % of the wave (1 % in the
 //! mean), where its highest point is up to 13 % below it.
 
-use super::{Angles, Points};
+#![allow(clippy::inline_always, reason = "see runout_numerics::lanes")]
+
+use super::{Angles, Points, ends_um};
+use runout_draws::DrawnErrors;
+use runout_numerics::lanes::{NullaryFnOnce, load, vectorised};
 
 /// By how much, in parts of the largest of some errors, they change a crest more than a height: within half a step, the weights of the three heights
 /// in a parabola are 1.25 together, without sign. A crest exceeds its highest point by an eighth of the step to one beside it at most, half of this.
@@ -24,6 +28,98 @@ pub(super) fn crest([before, here, after]: [f64; 3]) -> (f64, f64) {
 /// The height of [`crest`].
 pub(super) fn lifted(heights: [f64; 3]) -> f64 {
     crest(heights).0
+}
+
+/// Heights of a turn on equal angles to which errors are added, again and again.
+#[derive(Debug, Clone)]
+pub struct Heights<'a> {
+    undisturbed: &'a [f64],
+    /// What a crest may exceed its highest point by, without errors.
+    rise: f64,
+}
+
+impl<'a> Heights<'a> {
+    /// Of heights, of which missing ones are NaN.
+    #[must_use]
+    pub fn new(heights: &'a [f64]) -> Self {
+        let next = heights.iter().cycle().skip(1);
+        let steps = heights.iter().zip(next).map(|(here, next)| (next - here).abs());
+        // A crest exceeds its highest point by an eighth of a step at most.
+        Self { undisturbed: heights, rise: 0.5 * LIFT * steps.fold(0.0, f64::max) }
+    }
+
+    /// The lowest and the highest of them with crests between the angles, and the root mean square of them; NaN of nothing.
+    #[must_use]
+    pub fn undisturbed(&self) -> ([f64; 2], f64) {
+        let squares = self.undisturbed.iter().map(|height| height * height).sum::<f64>();
+        self.of(self.undisturbed, squares, 0.0)
+    }
+
+    /// The same with errors added.
+    #[must_use]
+    pub fn with(&self, errors: &DrawnErrors, sum: &mut Vec<f64>) -> ([f64; 2], f64) {
+        sum.resize(self.undisturbed.len(), 0.0);
+        let [first, others] = errors.parts();
+        let (of_first, of_others) = sum.split_at_mut(first.len());
+        let (heights, other_heights) = self.undisturbed.split_at(first.len());
+        let squares = vectorised(Sums { heights, errors: first, sum: of_first })
+            + vectorised(Sums { heights: other_heights, errors: others, sum: of_others });
+        self.of(sum, squares, errors.largest_um())
+    }
+
+    fn of(&self, heights: &[f64], squares: f64, largest: f64) -> ([f64; 2], f64) {
+        let (count, rise) = (heights.len(), self.rise + LIFT * largest);
+        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+        for (chunk, first) in heights.chunks(CHUNK).zip((0..).step_by(CHUNK)) {
+            let [lowest, highest] = ends_um(chunk);
+            // What is far from both ends found so far has no crest beyond them.
+            if highest > high - rise || lowest < low + rise {
+                for (point, height) in chunk.iter().enumerate() {
+                    if *height > high - rise || *height < low + rise {
+                        let crest = lifted(around(first + point, count).map(|point| heights[point]));
+                        (low, high) = (low.min(crest), high.max(crest));
+                    }
+                }
+            }
+        }
+        let ends = if low > high { [f64::NAN; 2] } else { [low, high] };
+        (ends, (squares / count as f64).sqrt())
+    }
+}
+
+/// Points that are looked at together.
+const CHUNK: usize = 64;
+
+/// Fills `sum` with heights and errors, and gives its sum of squares.
+struct Sums<'a> {
+    heights: &'a [f64],
+    errors: &'a [f64],
+    sum: &'a mut [f64],
+}
+
+impl NullaryFnOnce for Sums<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn call(self) -> f64 {
+        const LANES: usize = 16;
+        let Self { heights, errors, sum } = self;
+        let mut squares = [0.0; LANES];
+        let whole = sum.len() - sum.len() % LANES;
+        for place in (0..whole).step_by(LANES) {
+            let [heights, errors]: [[f64; LANES]; 2] = [load(heights, place), load(errors, place)];
+            for (lane, sum) in sum[place..place + LANES].iter_mut().enumerate() {
+                *sum = heights[lane] + errors[lane];
+                squares[lane] += *sum * *sum;
+            }
+        }
+        let rest = sum[whole..].iter_mut().zip(heights[whole..].iter().zip(&errors[whole..]));
+        let rest = rest.map(|(sum, (height, error))| {
+            *sum = height + error;
+            *sum * *sum
+        });
+        rest.sum::<f64>() + squares.iter().sum::<f64>()
+    }
 }
 
 /// Heights with their crests, and how far aside of its angle each is, in rad.

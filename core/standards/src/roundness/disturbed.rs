@@ -1,17 +1,15 @@
 //! A profile whose errors are drawn again and again.
 
-use std::{cell::OnceCell, f64::consts::TAU};
+use std::f64::consts::TAU;
 
 use super::{
-    Angles, Circle, FixedCentre, Points, Reference, Values,
+    Angles, Circle, Points, Reference, Values,
     crests::{Crests, LIFT, around},
     search,
     warm::{Found, Warm},
 };
-use crate::{
-    near::{Course, Near},
-    uncertainty::DrawnErrors,
-};
+use crate::near::{Course, Near};
+use runout_draws::DrawnErrors;
 
 /// A profile about one reference circle, with its crests between the angles. Only points that may come to touch it are looked
 /// at, where that is certain.
@@ -25,17 +23,9 @@ pub struct Disturbed<'a> {
     radius_mm: f64,
     near: Near,
     near_angles: Angles,
-    /// The points near the ends and those beside them, ascending.
-    with_beside: Vec<usize>,
-    /// Of each point near the ends its own place and those beside it among these.
-    places: Vec<[u32; 3]>,
     /// Centre of the circle about the profile itself.
     centre_um: [f64; 2],
     about: Values,
-    /// Deviations about LSCI, where errors do not move it.
-    unmoved_um: Option<Vec<f64>>,
-    /// The same, with its points by height, for draws at all of them.
-    fixed: OnceCell<FixedCentre>,
     search: Option<Warm>,
     points: Points,
     drawn_um: Vec<f64>,
@@ -103,14 +93,6 @@ impl<'a> CircleSearch<'a> {
         let near = Near::new(deviations, circle.deviation_um, usual_um);
         let ends = Course::of(deviations.iter().copied());
         let about = Course { squares: Course::of(raw.iter().copied()).squares, ..ends }.into();
-        let count = form_um.len();
-        let mut with_beside: Vec<usize> = near.points.iter().flat_map(|point| beside(between, *point, count)).collect();
-        with_beside.sort_unstable();
-        with_beside.dedup();
-        let place = |point: usize| with_beside.binary_search(&point).unwrap_or_default() as u32;
-        let places = near.points.iter().map(|point| beside(between, *point, count).map(place)).collect();
-        // Errors of orders from 2 on are at right angles to what moves LSCI, on all of the circle.
-        let stays = of_angles && raw.iter().all(|deviation| !deviation.is_nan());
         Some(Disturbed {
             reference,
             between,
@@ -119,12 +101,8 @@ impl<'a> CircleSearch<'a> {
             radius_mm,
             near_angles: angles.select(&near.points),
             near,
-            with_beside,
-            places,
             centre_um: [circle.x_um, circle.y_um],
             about,
-            unmoved_um: stays.then_some(raw),
-            fixed: OnceCell::new(),
             search: Warm::new(reference),
             points,
             drawn_um: Vec::new(),
@@ -143,41 +121,11 @@ impl Disturbed<'_> {
     /// Values of the profile with errors in it. RONq is that of all points about LSCI of an interrupted profile, or where crests are at the
     /// angles; else that of the points looked at, or NaN.
     pub fn values(&mut self, drawn: &DrawnErrors) -> Option<Values> {
-        match (self.reference, &self.unmoved_um) {
-            (Reference::LeastSquares, Some(unmoved_um)) => {
-                let fixed = self.fixed.get_or_init(|| FixedCentre::new(unmoved_um.clone()));
-                Some(if self.between { fixed.between(drawn) } else { fixed.values(drawn) })
-            }
-            (Reference::LeastSquares, None) => self.of_all(drawn),
-            _ => self
-                .of_near(drawn)
-                .or_else(|| self.anew((1.0 + LIFT) * drawn.largest_um()))
-                .or_else(|| self.of_all(drawn)),
-        }
-    }
-
-    /// The points that may come to touch, and those beside them.
-    #[must_use]
-    pub fn points(&self) -> &[usize] {
-        &self.with_beside
-    }
-
-    /// Values of the profile with these errors at its [`points`](Self::points), where no error is above `largest_um`; RONq is NaN.
-    /// `None` where other points could touch, or about LSCI of an interrupted profile.
-    pub fn values_at(&mut self, errors_um: &[f64], largest_um: f64) -> Option<Values> {
-        let form_um = self.unmoved_um.as_deref().unwrap_or(self.form_um);
-        self.drawn_um.clear();
-        self.drawn_um.extend(self.with_beside.iter().zip(errors_um).map(|(point, error)| form_um[*point] + error));
-        let (drawn_um, step_rad) = (&self.drawn_um, self.step_rad());
-        self.crests.set(self.places.iter().map(|places| places.map(|place| drawn_um[place as usize])), step_rad);
-        if self.unmoved_um.is_some() {
-            let ends = Course::of(self.crests.heights.iter().copied());
-            return Some(Course { squares: f64::NAN, points: self.form_um.len(), ..ends }.into());
-        }
         if self.reference == Reference::LeastSquares {
-            return None;
+            return self.of_all(drawn);
         }
-        self.touching((1.0 + LIFT) * largest_um).or_else(|| self.anew((1.0 + LIFT) * largest_um))
+        let anew = |own: &mut Self| own.anew((1.0 + LIFT) * drawn.largest_um());
+        self.of_near(drawn).or_else(|| anew(self)).or_else(|| self.of_all(drawn))
     }
 
     /// From the points looked at; `None` where others could touch.
@@ -324,11 +272,6 @@ mod tests {
                         let drawn: Vec<f64> = form.iter().zip(&errors).map(|(form, error)| form + error).collect();
                         let drawn_errors = DrawnErrors::new(&errors);
                         let quick = disturbed.values(&drawn_errors).unwrap();
-                        let near: Vec<f64> = disturbed.points().iter().map(|point| errors[*point]).collect();
-                        if let Some(at) = disturbed.values_at(&near, drawn_errors.largest_um()) {
-                            assert!((at.ront_um - quick.ront_um).abs() < 1e-9, "{reference:?} {size} {at:?} {quick:?}");
-                            assert!((at.ronp_um - quick.ronp_um).abs() < 1e-9, "{reference:?} {size} {at:?} {quick:?}");
-                        }
                         let (mut points, mut crests) = (Points::default(), Crests::default());
                         let slow: Values = if reference == Reference::LeastSquares {
                             points.set_profile(&angles, &drawn, 30.0);

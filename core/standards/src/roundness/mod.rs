@@ -20,8 +20,6 @@ mod crests;
 mod determine;
 mod disturbed;
 mod equal_heights;
-mod fixed_centre;
-mod hold;
 mod least_squares;
 mod points;
 mod search;
@@ -30,9 +28,8 @@ mod warm;
 
 use super::near::Course;
 pub use super::reference::{Reference, Undetermined};
+pub use crests::Heights;
 pub use disturbed::{CircleSearch, Disturbed};
-pub use fixed_centre::FixedCentre;
-pub use hold::Hold;
 pub use points::{Angles, Points};
 pub use series::{Series, between_angles};
 
@@ -88,15 +85,21 @@ impl From<Course> for Values {
 /// to terms of form²/radius.
 #[must_use]
 pub fn ront_lsci_um(form_um: &[f64]) -> f64 {
-    // Lanes that do not wait for each other: Monte Carlo asks for this many thousand times.
+    let [low, high] = ends_um(form_um);
+    high - low
+}
+
+/// The lowest and the highest at an angle; missing points are NaN, and so are both where nothing is there.
+fn ends_um(profile_um: &[f64]) -> [f64; 2] {
+    // Lanes that do not wait for each other: draws ask for this many thousand times.
     let (mut low, mut high) = ([f64::INFINITY; 8], [f64::NEG_INFINITY; 8]);
-    for chunk in form_um.chunks(8) {
+    for chunk in profile_um.chunks(8) {
         for (value, (low, high)) in chunk.iter().zip(low.iter_mut().zip(&mut high)) {
             *low = if *value < *low { *value } else { *low };
             *high = if *value > *high { *value } else { *high };
         }
     }
-    let (low, high) =
-        (low.into_iter().fold(f64::INFINITY, f64::min), high.into_iter().fold(f64::NEG_INFINITY, f64::max));
-    if form_um.is_empty() { f64::NAN } else { high - low }
+    let low = low.into_iter().fold(f64::INFINITY, f64::min);
+    let high = high.into_iter().fold(f64::NEG_INFINITY, f64::max);
+    if low > high { [f64::NAN; 2] } else { [low, high] }
 }

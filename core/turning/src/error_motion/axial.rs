@@ -11,17 +11,13 @@
 use super::{
     ErrorMotion, FINER,
     names::{RESIDUAL, STANDARD, XYZ, centre_of_chart, described, fundamental_along, over, unit},
-    noise::Orders,
     polar::Synchronous,
     synchronous::Named,
     turns::{between_setups, bounded, of_all_turns, rms_about_mean, rms_across, root_mean_square, widest},
 };
 use crate::spread::{Direction, Spread};
-use runout_standards::{
-    Value,
-    roundness::Angles,
-    uncertainty::{self, Uncertainty},
-};
+use runout_draws::{self as draws, Uncertainty};
+use runout_standards::{Value, roundness::Angles};
 
 /// Synchronous values along the axis in words, and those without the fundamental.
 pub(super) const WHOLE: &str = "synchronous error motion value";
@@ -59,9 +55,9 @@ impl ErrorMotion<'_> {
         z_mm: f64,
     ) -> Option<[Value; 2]> {
         let id = self.id(direction);
-        let seed = uncertainty::seed(&[self.station, &id, kind]);
+        let seed = draws::seed(&[self.station, &id, kind]);
         let centre = centre_of_chart();
-        let seen = plot.seen(centre, self.angles, plot.band[0], seed, Orders::Many)?;
+        let seen = plot.seen(centre, self.angles, plot.band[0], seed)?;
         let described = described_within(direction, plot, z_mm);
         let named = Named { kind, what, id: &id, described: &described, unit: unit(direction), centre };
         Some(plot.values(&named, &seen))
@@ -132,6 +128,7 @@ impl ErrorMotion<'_> {
             reference: centre_of_chart().symbol().into(),
             coverage: 1.0,
             uncertainty,
+            raised_by_noise: None,
             refuted_by: None,
         }
     }

@@ -8,8 +8,7 @@
 //! direction it is 2/rev of the plot, and in the values; residual synchronous tilt leaves it out. *Total with the
 //! fundamental* is the range of all turns with it, about the centre of the polar chart.
 //!
-//! Noise of many high orders adds to a range. Its share is taken out of synchronous values, each of which says how much it
-//! is.
+//! Noise of many high orders adds to a range, as it does to values of form: the interval is without it, and a value says by how much it is raised.
 //!
 //! x and y are those in the plane midway between the sensors, where noise is least.
 //!
@@ -18,7 +17,6 @@
 mod axial;
 mod marks;
 mod names;
-mod noise;
 mod plots;
 mod polar;
 mod standing;
@@ -41,12 +39,11 @@ use crate::{
     spread::{Direction, Spread},
 };
 use names::{STANDARD, XYZ, chosen_id, described, fundamental_across, id, kind_of, over, place, unit};
-use noise::Orders;
 use polar::{Motion, Synchronous};
+use runout_draws::{self as draws, Uncertainty};
 use runout_standards::{
     Value,
     roundness::{Angles, Points, Reference},
-    uncertainty::{self, Uncertainty},
 };
 use synchronous::Named;
 use turns::{between_setups, bounded, directions, of_all_turns, rms_across, root_mean_square, widest};
@@ -74,9 +71,6 @@ pub const CENTRE: Centre = Centre::Plot(Reference::LeastSquares);
 /// The ends of a range are looked for on so many times the angles of the average: 16 to a wave of its highest order or more, so that a
 /// crest between two of them is at most 1 − cos(π/16), 2 %, higher, and one of a tenth of that order 2e-4.
 const FINER: usize = 8;
-
-/// Shares of noise below this, in µm or µrad, are not said: they would be written as 0.
-const SAID: f64 = 5e-4;
 
 impl ErrorMotion<'_> {
     /// All values, about each of these centres; none without a spread over turns. Where the data do not decide between separations,
@@ -142,8 +136,8 @@ impl ErrorMotion<'_> {
         spreads: &[&Spread],
     ) -> Option<Vec<Value>> {
         let mut points = Points::default();
-        let seed = uncertainty::seed(&[self.station, id(direction), centre.symbol()]);
-        let seen = plot.seen(centre, self.angles, 2, seed, Orders::Many)?;
+        let seed = draws::seed(&[self.station, id(direction), centre.symbol()]);
+        let seen = plot.seen(centre, self.angles, 2, seed)?;
         let rms = seen.rms.value;
         let (mut all, mut each, mut each_rms) = ((f64::INFINITY, f64::NEG_INFINITY), Vec::new(), Vec::new());
         for spread in spreads {
@@ -165,6 +159,7 @@ impl ErrorMotion<'_> {
             value,
             source: format!("{STANDARD}, {what}, {described}"),
             uncertainty,
+            raised_by_noise: None,
             ..range.clone()
         };
         let std = |known: &Option<Uncertainty>, across| {
@@ -218,6 +213,7 @@ impl ErrorMotion<'_> {
             reference: Centre::PolarChart.symbol().into(),
             coverage: 1.0,
             uncertainty: bounded(between_setups(&each, self.carried(direction, spreads, widest)), plot.bound),
+            raised_by_noise: None,
             refuted_by: None,
         })
     }
@@ -264,6 +260,7 @@ impl ErrorMotion<'_> {
             reference: "turns at one angle".into(),
             coverage: 1.0,
             uncertainty,
+            raised_by_noise: None,
             refuted_by: None,
         };
         let [std, rms_std] = [widest, rms_across].map(|across| self.carried(direction, spreads, across));

@@ -5,7 +5,8 @@ use crate::{
     azimuth::{Azimuth, FacePlace},
     spread::{Direction, Spread},
 };
-use runout_standards::{Value, uncertainty::Uncertainty};
+use runout_draws::Uncertainty;
+use runout_standards::Value;
 
 pub(super) const STANDARD: &str = "ISO 230-7:2015";
 
@@ -195,6 +196,7 @@ fn fundamental(id: &str, direction: Direction, what: &str, value: f64, uncertain
         reference: centre_of_chart().symbol().into(),
         coverage: 1.0,
         uncertainty,
+        raised_by_noise: None,
         refuted_by: None,
     }
 }

@@ -4,11 +4,9 @@ use crate::{
     separation::{Quantity, Separation, UM_PER_MM_URAD},
     spread::{Direction, Projection, face_shares},
 };
+use runout_draws::crest_order;
 use runout_numerics::{Complex64, fourier::Fourier};
-use runout_standards::{
-    roundness::{Angles, Points, Reference},
-    uncertainty::crest_order,
-};
+use runout_standards::roundness::{Angles, Points, Reference};
 
 /// What the values of a polar plot are referred to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -160,8 +158,9 @@ impl Synchronous {
         })
     }
 
-    /// In a fixed direction, from coefficients of Re Σ cₙ e^{+inΦ} and the variance of each by order from 0, of those from `lowest` on.
-    pub(super) fn fixed(lowest: usize, harmonics: &[Complex64], variance: &[f64]) -> Self {
+    /// In a fixed direction, from coefficients of Re Σ cₙ e^{+inΦ} and the variance of each by order from 0, known from so many squares
+    /// (0: exactly), of those from `lowest` on.
+    pub(super) fn fixed(lowest: usize, harmonics: &[Complex64], variance: &[f64], squares: usize) -> Self {
         let counting = |order: usize| order >= lowest;
         let first =
             harmonics.iter().enumerate().map(|(n, value)| if counting(n) { value.conj() } else { Complex64::ZERO });
@@ -171,7 +170,7 @@ impl Synchronous {
             first: first.collect(),
             second: None,
             variance: variance.collect(),
-            freedom: Vec::new(),
+            freedom: vec![squares; harmonics.len()],
             lost: Vec::new(),
             bound: 0.0,
         }

@@ -9,16 +9,13 @@ use super::{
     names::{
         RESIDUAL, centre_of_chart, described, fundamental_across, fundamental_along, kind_of, letter_id, place, unit,
     },
-    noise::Orders,
     polar::Synchronous,
-    synchronous::{Measured, Named, Seen},
+    synchronous::Named,
 };
 use crate::spread::{Direction, face_shares};
+use runout_draws::{self as draws, Uncertainty};
 use runout_numerics::Complex64;
-use runout_standards::{
-    Value,
-    uncertainty::{self, NORMAL_95, Uncertainty, student_95},
-};
+use runout_standards::Value;
 
 /// Angles an order, at least, on which errors are drawn: the ends of a range are looked for on a multiple of them.
 const ANGLES_AN_ORDER: usize = 4;
@@ -89,28 +86,13 @@ impl StandingMotion<'_> {
     }
 
     fn about(&self, centre: Centre, lowest: usize, kind: &str, what: &str) -> Option<[Value; 2]> {
-        let plot = Synchronous::fixed(lowest, self.harmonics, self.variance);
+        let plot = Synchronous::fixed(lowest, self.harmonics, self.variance, self.freedom.round() as usize);
         let (id, described) = (self.id(), described(self.direction, self.z_mm, self.letters));
         let angles = (ANGLES_AN_ORDER * self.harmonics.len()).max(FEWEST_ANGLES);
-        let seed = uncertainty::seed(&[self.of, &id, kind, centre.symbol()]);
-        let Seen { range, rms, finely } = plot.seen(centre, angles, lowest, seed, Orders::Few)?;
-        let seen = Seen { range: self.as_known(range), rms: self.as_known(rms), finely };
+        let seed = draws::seed(&[self.of, &id, kind, centre.symbol()]);
+        let seen = plot.seen(centre, angles, lowest, seed)?;
         let named = Named { kind, what, id: &id, described: &described, unit: unit(self.direction), centre };
         Some(plot.values(&named, &seen))
-    }
-
-    /// With an interval as wide as the variances are badly known, and with the uncertainty of the share of noise.
-    fn as_known(&self, mut found: Measured) -> Measured {
-        if self.freedom > 0.0 {
-            let share = found.share / (2.0 * self.freedom).sqrt();
-            let wider = |known: Uncertainty| {
-                let std = known.std.hypot(share);
-                let factor = if known.std > 0.0 { std / known.std } else { 1.0 };
-                Uncertainty { std, ..known.widened(factor * student_95(self.freedom) / NORMAL_95) }
-            };
-            found.known = found.known.map(wider);
-        }
-        found
     }
 }
 

@@ -1,31 +1,27 @@
 //! Synchronous values of a plot about a centre: peak to valley and root mean square, without what noise adds to them.
 
-use std::cell::RefCell;
-
 use super::{
-    Centre, FINER, SAID,
+    Centre, FINER,
     names::STANDARD,
-    noise::{Measure, NoiseOf, Orders, without_noise},
     polar::{Synchronous, seen_from},
     turns::{bounded, rms_about_mean},
 };
+use runout_draws::{self as draws, Draws, Interval, KINDS, Uncertainty, drawn_angles};
+use runout_numerics::{Complex64, fourier::Fourier};
 use runout_standards::{
     Value,
-    roundness::{Angles, Points, ront_lsci_um},
-    uncertainty::{Uncertainty, drawn_angles},
+    roundness::{Angles, Heights, Points, ront_lsci_um},
 };
 
 /// Points on a wave where errors are drawn.
-const DRAWN_POINTS_A_WAVE: usize = 8;
+const DRAWN_POINTS_A_WAVE: usize = 4;
 
 /// A value of a plot.
 pub(super) struct Measured {
-    /// Without the share of noise.
     pub value: f64,
-    /// What noise adds in the mean.
-    pub share: f64,
     /// Where the variance of the plot's harmonics is known.
     pub known: Option<Uncertainty>,
+    pub raised_by_noise: Option<f64>,
 }
 
 /// A plot as it is seen from a centre.
@@ -52,36 +48,48 @@ pub(super) struct Named<'a> {
 
 impl Synchronous {
     /// The plot from a centre, with errors of orders from `lowest` on; `None` where the centre is not determined.
-    pub(super) fn seen(&self, centre: Centre, angles: usize, lowest: usize, seed: u64, orders: Orders) -> Option<Seen> {
-        let points = RefCell::new(Points::default());
-        let seen_on = |count: usize| self.seen_on(count, centre, &mut points.borrow_mut());
+    pub(super) fn seen(&self, centre: Centre, angles: usize, lowest: usize, seed: u64) -> Option<Seen> {
+        let mut points = Points::default();
         // Errors raise crests between the given angles too. Draws on angles that show them tell the error as well as draws on
         // those where the range is sought, from which it differs by little.
         let count = drawn_angles(DRAWN_POINTS_A_WAVE, self.crest_orders(), self.band[1] + 1);
-        let (seen, finely) = (seen_on(count)?, seen_on(FINER * angles)?);
-        let between = ront_lsci_um(&finely) - ront_lsci_um(&seen);
+        let (seen, finely) =
+            (self.seen_on(count, centre, &mut points)?, self.seen_on(FINER * angles, centre, &mut points)?);
+        let mut fourier = Fourier::new(count);
+        let mut harmonics = vec![Complex64::ZERO; self.variance.len().min(fourier.max_order() + 1)];
+        fourier.analyse(seen.iter().copied(), &mut harmonics);
+        let (variance, squares) = (self.variance[..harmonics.len()].to_vec(), self.freedom.clone());
+        let draws = Draws::of_section(&draws::Measured { harmonics, variance, squares, lowest }, seed);
         let angles = Angles::shared(count);
-        let about_moved = |plot: &[f64]| {
-            let place = centre.of(&angles, plot, &mut points.borrow_mut()).unwrap_or_default();
-            let seen = seen_from(place, &angles, plot);
-            [ront_lsci_um(&seen), rms_about_mean(&seen)]
-        };
-        let values = if centre.is_linear() { Measure::AboutFixedCentre } else { Measure::Of(&about_moved) };
-        let found = [ront_lsci_um(&seen), rms_about_mean(&seen)];
-        let noise = NoiseOf { variance: &self.variance, freedom: &self.freedom, lowest, seed };
-        let known = without_noise(found, &seen, &noise, (&values, orders));
-        let [range_known, rms_known] = known.map_or([None, None], |known| known.map(Some));
-        let measured = |found: f64, between: f64, known: Option<(f64, Uncertainty)>| match known {
-            Some((share, known)) => {
-                // An interval from 0 on stays one: it holds a plot without motion.
-                let low = known.interval_95[0];
-                let mut known = known.moved(between);
-                known.interval_95[0] = if low > 0.0 { known.interval_95[0] } else { low };
-                Measured { value: (found + between - share).max(0.0), share, known: Some(known) }
+        // Without the mean, about which the root mean square is.
+        let weight = |order: usize| if order == 0 { Complex64::ZERO } else { Complex64::ONE };
+        let profiles = draws.as_ref().map(|draws| draws.profiles(weight, count, |_, _| ()));
+        let known = profiles.map_or_else(Vec::new, |profiles| {
+            if centre.is_linear() {
+                let of_kind = |kind| Heights::new(&profiles.undisturbed_um(kind)[0]);
+                let heights: Vec<Heights> = (0..KINDS).map(of_kind).collect();
+                let mut sum = Vec::new();
+                return profiles.values(|kind, noise, found| {
+                    let plot = &heights[kind];
+                    let ([low, high], rms) =
+                        noise.map_or_else(|| plot.undisturbed(), |noise| plot.with(&noise[0], &mut sum));
+                    found.extend([high - low, rms]);
+                });
             }
-            None => Measured { value: found + between, share: 0.0, known: None },
+            profiles.values_of_section(|plot, found| {
+                let place = centre.of(&angles, plot, &mut points).unwrap_or_default();
+                let seen = seen_from(place, &angles, plot);
+                found.extend([ront_lsci_um(&seen), rms_about_mean(&seen)]);
+            })
+        });
+        let measured = |index: usize, value: f64| {
+            let known = known.get(index);
+            let raised_by_noise = known.and_then(Interval::raised_by_noise);
+            Measured { value, known: known.and_then(|known| known.at(value)), raised_by_noise }
         };
-        Some(Seen { range: measured(found[0], between, range_known), rms: measured(found[1], 0.0, rms_known), finely })
+        let range = measured(0, ront_lsci_um(&finely));
+        let rms = measured(1, rms_about_mean(&seen));
+        Some(Seen { range, rms, finely })
     }
 
     /// The plot from a centre, on so many equal angles.
@@ -103,27 +111,22 @@ impl Synchronous {
             &seen.rms,
             0.5 * self.bound,
         );
-        [range, rms].map(|(symbol, what, Measured { value, share, known }, bound)| {
-            let noise = match known {
-                Some(_) if *share >= SAID => format!(", without {share:.3} {unit} that noise adds to it"),
-                _ => String::new(),
-            };
-            Value {
-                symbol,
-                unit: unit.to_owned(),
-                value: *value,
-                source: format!("{STANDARD}, {what}{noise}, {described}"),
-                band_upr: self.band,
-                lost_orders: self.lost.clone(),
-                weakened_above_upr: None,
-                absent_above_upr: None,
-                no_uncertainty: None,
-                filter: "none".into(),
-                reference: centre.symbol().into(),
-                coverage: 1.0,
-                uncertainty: bounded(known.clone(), bound),
-                refuted_by: None,
-            }
+        [range, rms].map(|(symbol, what, Measured { value, known, raised_by_noise }, bound)| Value {
+            symbol,
+            unit: unit.to_owned(),
+            value: *value,
+            source: format!("{STANDARD}, {what}, {described}"),
+            band_upr: self.band,
+            lost_orders: self.lost.clone(),
+            weakened_above_upr: None,
+            absent_above_upr: None,
+            no_uncertainty: None,
+            filter: "none".into(),
+            reference: centre.symbol().into(),
+            coverage: 1.0,
+            uncertainty: bounded(known.clone(), bound),
+            raised_by_noise: *raised_by_noise,
+            refuted_by: None,
         })
     }
 }

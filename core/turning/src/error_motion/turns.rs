@@ -1,7 +1,7 @@
 //! Ranges and root mean squares over the turns of setups.
 
 use crate::spread::{Direction, Spread};
-use runout_standards::uncertainty::{NORMAL_95, Uncertainty, student_95};
+use runout_draws::{NORMAL_95, Uncertainty, student_95};
 
 /// The directions that some setup gives, each once.
 pub(super) fn directions(spreads: &[&Spread]) -> Vec<Direction> {

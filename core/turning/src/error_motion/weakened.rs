@@ -1,7 +1,8 @@
 //! Error motion values behind a low-pass.
 
 use crate::separation::Separation;
-use runout_standards::{Value, uncertainty::stands_out};
+use runout_draws::stands_out;
+use runout_standards::Value;
 
 /// The values with their bands ending where filters before the averages pass half of the power, at `half_power_upr`. Where motion stands
 /// out from its noise from half of that on, values of repeating motion say that it is weakened.
@@ -53,6 +54,7 @@ mod tests {
             reference: "LSC".into(),
             coverage: 1.0,
             uncertainty: None,
+            raised_by_noise: None,
             refuted_by: None,
         };
         let of = |order: usize| {

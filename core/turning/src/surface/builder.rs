@@ -9,13 +9,14 @@ use crate::{
     separation::{Quantity, SectionAt},
     station::StationResult,
 };
+use runout_draws::Errors;
 use runout_error::{Error, ErrorKind, Result};
 use runout_numerics::{
     Complex64,
     fourier::{Fourier, max_order},
     threads::both,
 };
-use runout_standards::{drawn::remove_noise, uncertainty::Errors};
+use runout_standards::drawn::remove_noise;
 
 /// Sections nearer to each other than this lie at one z, in mm: a carriage's repeatability.
 const SAME_Z_MM: f64 = 1e-3;

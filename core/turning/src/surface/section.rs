@@ -1,8 +1,9 @@
 //! Sections of a surface: their orders, and the noise that their errors are made of.
 
 use crate::separation::{Quantity, Separation};
+use runout_draws::stands_out;
 use runout_numerics::Complex64;
-use runout_standards::{gaps::Gaps, uncertainty::stands_out};
+use runout_standards::gaps::Gaps;
 
 /// One section's form, order by order from 0; `None` where it is not known.
 #[derive(Debug)]

@@ -3,9 +3,10 @@
 use std::{borrow::Cow, collections::BTreeSet};
 
 use super::{
-    ArealFilter, Content, Evaluate, Filter, FormRemoval, Found, Group, Label, PartSummary, labelled_with_reasons,
+    ArealFilter, Content, Evaluate, Filter, FormRemoval, Found, Group, Label, PartSummary, labelled,
     section_gaps::SectionGaps, texture::found,
 };
+use runout_draws::seed;
 use runout_error::Result;
 use runout_numerics::{
     filter::{areal_gaussian, robust_areal_gaussian},
@@ -18,7 +19,6 @@ use runout_standards::{
     areal::{self, Areal, MaterialRatio, Spatial, SpatialDraws},
     drawn::{Drawn, Sensitivity, in_pairs},
     twist::{self, Twist},
-    uncertainty::seed,
 };
 use runout_turning::surface::{Section, Surface, Uncertain};
 
@@ -80,7 +80,7 @@ pub(crate) fn add_areal(
     let there = 1.0 - map.missing() as f64 / map.heights_um().len() as f64;
     let add = |values: &mut Vec<Value>, (labels, numbers): (Vec<Label>, Vec<Found>)| {
         let filter = filter(evaluate, surface.radius_mm);
-        values.extend(labelled_with_reasons(labels, numbers, &filter, &held, there.min(used)));
+        values.extend(labelled(labels, numbers, &filter, &held, there.min(used)));
     };
     if evaluate.has(Group::Areal) {
         let (draws, found) =
@@ -323,7 +323,7 @@ const NOT_DRAWN: &str = "no errors are drawn for it";
 
 /// A number without uncertainty.
 fn without(value: f64, why: &str) -> Found {
-    Found { value, uncertainty: None, no_uncertainty: Some(why.to_owned()) }
+    Found { no_uncertainty: Some(why.to_owned()), ..Found::of(value, None) }
 }
 
 /// A map without the wavelengths below λs and above λc.

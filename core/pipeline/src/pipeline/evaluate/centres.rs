@@ -7,7 +7,7 @@
 //! Taper, straightness of generatrices and parallelism are largest sizes of what is linear in the form: f(t + e) differs from
 //! f(t) by f(e) at most, which draws of the errors alone give.
 
-use runout_standards::uncertainty::Uncertainty;
+use runout_draws::Uncertainty;
 
 /// Share of noise that the largest error of several centres exceeds.
 const BEYOND: f64 = 0.05;

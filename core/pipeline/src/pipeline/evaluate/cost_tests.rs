@@ -67,7 +67,6 @@ fn cost_of_all_values() {
     println!("of one thread:");
     let groups = [
         "values = ['roundness']",
-        "values = ['roundness']\nuncertainty = 'monte-carlo'",
         "values = ['roundness']\nreferences = ['LSCI']",
         "values = ['roundness']\nreferences = ['MZCI']",
         "values = ['roundness']\nreferences = ['MICI']",

@@ -14,7 +14,7 @@ use super::{
     tests::{RADIUS_MM, evaluate, find, lobes, station},
 };
 use runout_numerics::Complex64;
-use runout_standards::{Value, uncertainty::Uncertainty};
+use runout_standards::Value;
 use runout_turning::surface::{SurfaceBuilder, SurfaceConfig};
 
 /// Highest order of the simulated averages.
@@ -115,64 +115,22 @@ fn texture_intervals_hold_the_truth() {
     assert_eq!(found.share("Rsm", "Gaussian λc 8 mm").0, 0);
 }
 
-/// How `[evaluate]` asks for roundness about one circle, and for one way to its intervals.
-fn roundness_by(way: &str, reference: &str) -> String {
-    format!("values = ['roundness']\nreferences = ['{reference}']\nuncertainty = '{way}'")
-}
-
-/// Errors at few points and whole profiles with errors give the same intervals, but for chance.
 #[test]
-fn linear_intervals_of_roundness_are_those_of_monte_carlo() {
-    let variance = 2.0 * 0.003_f64.powi(2) / (HIGHEST - 1) as f64;
-    for reference in ["LSCI", "MZCI", "MICI", "MCCI"] {
-        let mut ratios: Vec<[f64; 2]> = Vec::new();
-        let sections = 12;
-        for section in 0..sections {
-            let waves = Spectrum::Power.waves(section);
-            let station = station(section as f64, &waves, HIGHEST, variance, &[]);
-            let values = ["linear", "monte-carlo"]
-                .map(|way| section_values(&station, 0, &evaluate(&roundness_by(way, reference)).unwrap(), RADIUS_MM));
-            let [linear, drawn] = values;
-            for (linear, drawn) in linear.iter().zip(&drawn) {
-                assert_eq!((&linear.symbol, linear.value), (&drawn.symbol, drawn.value));
-                let [linear, drawn] = [linear, drawn].map(|value| value.uncertainty.as_ref().unwrap());
-                let width = |known: &Uncertainty| known.interval_95[1] - known.interval_95[0];
-                ratios.push([linear.std / drawn.std, width(linear) / width(drawn)]);
-            }
-        }
-        let count = ratios.len() as f64;
-        // Of 24 or more intervals, each known to a tenth from 16 transforms.
-        for mean in [0, 1].map(|of| ratios.iter().map(|ratio| ratio[of]).sum::<f64>() / count) {
-            assert!((mean - 1.0).abs() < 0.08, "{reference}: {mean}");
-        }
-    }
-}
-
-#[test]
-#[ignore = "prints the table of docs/uncertainty.md, which takes minutes"]
-fn roundness_intervals_both_ways() {
+#[ignore = "prints a table of docs/appendix/intervals.md, which takes minutes"]
+fn roundness_intervals_of_two_spectra() {
+    let text = "values = ['roundness']\nreferences = ['LSCI', 'MZCI', 'MICI', 'MCCI']";
     for (spectrum, std_um) in
         [Spectrum::Lines, Spectrum::Power].into_iter().flat_map(|s| [0.003, 0.02, 0.1].map(|std| (s, std)))
     {
         println!("{spectrum:?}, {std_um} µm");
-        for reference in ["LSCI", "MZCI", "MICI", "MCCI"] {
-            let both =
-                ["linear", "monte-carlo"].map(|way| intervals(&roundness_by(way, reference), spectrum, std_um, 400).0);
-            let [linear, drawn] = both;
-            for ((symbol, filter, stated, inside), drawn) in linear.into_iter().zip(drawn) {
-                let percent = |inside: usize| 100.0 * inside as f64 / stated as f64;
-                println!(
-                    "| {symbol} | {reference} | {filter} | {:.1} % | {:.1} % |",
-                    percent(inside),
-                    percent(drawn.3)
-                );
-            }
+        for (symbol, filter, stated, inside) in intervals(text, spectrum, std_um, 400).0 {
+            println!("| {symbol} | {filter} | {:.1} % |", 100.0 * inside as f64 / stated as f64);
         }
     }
 }
 
 #[test]
-#[ignore = "prints the table of docs/uncertainty.md, which takes minutes"]
+#[ignore = "prints the table of docs/appendix/intervals.md, which takes minutes"]
 fn texture_intervals_of_two_spectra() {
     for spectrum in [Spectrum::Lines, Spectrum::Power] {
         for std_um in [0.003, 0.02, 0.1] {
@@ -307,7 +265,7 @@ fn areal_intervals_hold_the_truth() {
 }
 
 #[test]
-#[ignore = "prints the table of docs/uncertainty.md, which takes minutes"]
+#[ignore = "prints the table of docs/appendix/intervals.md, which takes minutes"]
 fn areal_intervals_of_two_spectra() {
     for spectrum in [Spectrum::Lines, Spectrum::Power] {
         for std_um in [0.003, 0.03] {

@@ -2,13 +2,13 @@
 
 use super::{
     Filter, Label,
-    wall::{About, DecidedBy, Wall},
+    wall::{Look, Wall},
 };
+use runout_draws::{Errors, KINDS, LARGEST};
 use runout_numerics::fourier::Fourier;
 use runout_standards::{
     Value,
     cylindricity::{Disturbed, Points, Reference, Section, Series, Values},
-    uncertainty::{Errors, LARGEST},
 };
 
 impl Wall {
@@ -29,43 +29,36 @@ impl Wall {
         let usual_um =
             self.errors(filter).map(|errors| LARGEST * errors.iter().map(Errors::std_um).fold(0.0, f64::max));
         let harmonics: Vec<_> = self.rings.iter().map(|ring| filter.harmonics(&ring.harmonics)).collect();
-        let mut disturbed: Vec<Option<Disturbed>> = Vec::new();
-        self.evaluate(
-            filter,
-            labels,
-            (self.draws(), DecidedBy::AllSections),
-            About::WithoutNoise,
-            |sections, largest_um, found| {
-                let is_first = disturbed.is_empty();
-                let points = is_first.then(|| Points::of_sections(self.radius_mm, sections));
-                let mut series =
-                    (!is_first && largest_um.is_none()).then(|| Series::new(sections, &harmonics, self.radius_mm));
-                for (index, reference) in references.iter().enumerate() {
-                    let about = if let Some(points) = &points {
-                        // The first wall is the one that errors are drawn about.
-                        let prepare = |usual_um| {
-                            Disturbed::new(*reference, sections, points, self.radius_mm, usual_um, !self.placed)
-                        };
-                        disturbed.push(usual_um.and_then(prepare));
-                        disturbed.last().and_then(Option::as_ref).map(Disturbed::about)
-                    } else if let Some(series) = &mut series {
-                        series.about(*reference).ok().map(|found| found.1)
-                    } else {
-                        let prepared = disturbed.get_mut(index).and_then(Option::as_mut);
-                        prepared.zip(largest_um).and_then(|(wall, largest_um)| wall.values(sections, largest_um))
-                    };
-                    let of = |value: fn(&Values) -> f64| about.as_ref().map_or(f64::NAN, value);
-                    found.push(of(|values| values.cylt_um));
-                    if *reference == Reference::LeastSquares {
-                        found.extend([
-                            of(|values| values.cylp_um),
-                            of(|values| values.cylv_um),
-                            of(|values| values.cylq_um),
-                        ]);
+        let mut disturbed: Vec<Vec<Option<Disturbed>>> = vec![Vec::new(); KINDS];
+        self.evaluate(filter, labels, |Look { kind, sections, largest_um }, found| {
+            let mut series = kind.is_none().then(|| Series::new(sections, &harmonics, self.radius_mm));
+            if let (Some(kind), None) = (kind, largest_um) {
+                let points = Points::of_sections(self.radius_mm, sections);
+                let prepare = |reference: &Reference| {
+                    Disturbed::new(*reference, sections, &points, self.radius_mm, usual_um?, !self.placed)
+                };
+                disturbed[kind] = references.iter().map(prepare).collect();
+            }
+            for (index, reference) in references.iter().enumerate() {
+                let about = match (&mut series, kind, largest_um) {
+                    (Some(series), ..) => series.about(*reference).ok().map(|found| found.1),
+                    (None, Some(kind), None) => disturbed[kind][index].as_ref().map(Disturbed::about),
+                    (None, Some(kind), Some(largest_um)) => {
+                        disturbed[kind][index].as_mut().and_then(|wall| wall.values(sections, largest_um))
                     }
+                    (None, None, _) => None,
+                };
+                let of = |value: fn(&Values) -> f64| about.as_ref().map_or(f64::NAN, value);
+                found.push(of(|values| values.cylt_um));
+                if *reference == Reference::LeastSquares {
+                    found.extend([
+                        of(|values| values.cylp_um),
+                        of(|values| values.cylv_um),
+                        of(|values| values.cylq_um),
+                    ]);
                 }
-            },
-        )
+            }
+        })
     }
 
     /// Why the wall does not have the reference cylinders that are asked for, each with its reason.

@@ -127,7 +127,7 @@ fn intervals_hold_the_truth_of_extremes_unlike_those_of_waves() {
 }
 
 #[test]
-#[ignore = "prints the table of docs/uncertainty.md"]
+#[ignore = "prints the table of docs/appendix/intervals.md"]
 fn intervals_of_extremes_unlike_those_of_waves() {
     const N: u64 = 200;
     let print = |case: &str, all: BTreeMap<&'static str, Held>| {

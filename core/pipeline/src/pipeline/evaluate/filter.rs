@@ -49,7 +49,7 @@ impl Filter {
 
     /// Share of an order that passes, with its phase. A high-pass leaves level and centre, orders 0 and 1, which are position
     /// and no form, where they are known.
-    fn weight(&self, order: usize) -> Complex64 {
+    pub(crate) fn weight(&self, order: usize) -> Complex64 {
         let upr = order as f64;
         let low = self.band.below_upr.map_or(Complex64::ONE, |cutoff| self.kind.low_pass(upr, cutoff));
         let high = self.band.above_upr.filter(|_| order > 1);

@@ -7,15 +7,15 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use super::{
-    Content, Evaluate, Found, Group, Label, PartSummary, labelled_with_reasons,
+    Content, Evaluate, Found, Group, Label, PartSummary, labelled,
     texture::{found, sensitivity},
 };
+use runout_draws::seed;
 use runout_numerics::{Complex64, stretches::covered};
 use runout_standards::{
     Value,
     drawn::in_pairs,
     texture::{self, Kind, Settings},
-    uncertainty::seed,
 };
 use runout_turning::surface::{Section, Uncertain};
 
@@ -157,6 +157,6 @@ impl<'a> Generatrix<'a> {
             half_power_upr: None,
             shows_weakened: false,
         };
-        labelled_with_reasons(labels.collect(), numbers, &filter.along_axis(), &held, coverage)
+        labelled(labels.collect(), numbers, &filter.along_axis(), &held, coverage)
     }
 }

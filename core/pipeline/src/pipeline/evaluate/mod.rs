@@ -31,7 +31,8 @@ pub(super) use section::{missing_circles, section_values, steepest_um_per_deg};
 
 use crate::summary::{Limit, PartSummary};
 use filter::Filter;
-use runout_standards::{Value, uncertainty::Uncertainty};
+use runout_draws::{Interval, Uncertainty};
+use runout_standards::Value;
 
 /// What a number is, before it is known.
 #[derive(Debug, Clone)]
@@ -86,33 +87,25 @@ struct Found {
     uncertainty: Option<Uncertainty>,
     /// Why there is none, where the errors are known.
     no_uncertainty: Option<String>,
+    raised_by_noise: Option<f64>,
+}
+
+impl Found {
+    /// A number found as `value`, of which draws are known, where errors are.
+    fn of(value: f64, known: Option<&Interval>) -> Self {
+        let uncertainty = known.and_then(|known| known.at(value));
+        Self { value, uncertainty, no_uncertainty: None, raised_by_noise: known.and_then(Interval::raised_by_noise) }
+    }
 }
 
 impl From<(f64, Option<Uncertainty>)> for Found {
     fn from((value, uncertainty): (f64, Option<Uncertainty>)) -> Self {
-        Self { value, uncertainty, no_uncertainty: None }
+        Self { value, uncertainty, no_uncertainty: None, raised_by_noise: None }
     }
 }
 
 /// Numbers under their labels; what is no number is left out: the profile or the wall does not have that value.
-fn labelled(
-    labels: Vec<Label>,
-    found: Vec<(f64, Option<Uncertainty>)>,
-    filter: &Filter,
-    held: &Content,
-    coverage: f64,
-) -> Vec<Value> {
-    labelled_with_reasons(labels, found.into_iter().map(Found::from).collect(), filter, held, coverage)
-}
-
-/// The same of numbers that say why they have no uncertainty.
-fn labelled_with_reasons(
-    labels: Vec<Label>,
-    found: Vec<Found>,
-    filter: &Filter,
-    held: &Content,
-    coverage: f64,
-) -> Vec<Value> {
+fn labelled(labels: Vec<Label>, found: Vec<Found>, filter: &Filter, held: &Content, coverage: f64) -> Vec<Value> {
     let lost_orders = filter.lost(&held.lost);
     let weakened_above_upr = held
         .half_power_upr
@@ -120,7 +113,7 @@ fn labelled_with_reasons(
     let absent_above_upr = Some(held.all_to).filter(|order| filter.reaches_above(*order));
     let known = labels.into_iter().zip(found).filter(|(_, found)| found.value.is_finite());
     known
-        .map(|(label, Found { value, uncertainty, no_uncertainty })| Value {
+        .map(|(label, Found { value, uncertainty, no_uncertainty, raised_by_noise })| Value {
             symbol: label.symbol.into(),
             unit: ascii_unit(label.unit),
             value,
@@ -134,6 +127,7 @@ fn labelled_with_reasons(
             reference: label.reference,
             coverage,
             uncertainty,
+            raised_by_noise,
             refuted_by: None,
         })
         .collect()

@@ -5,6 +5,7 @@ use super::{
     texture::{found, sensitivity},
 };
 use crate::stage::OpenProfile;
+use runout_draws::seed;
 use runout_numerics::stretches::covered;
 use runout_standards::{
     Value,
@@ -12,7 +13,6 @@ use runout_standards::{
     roundness::Reference,
     straightness::Straightness,
     texture::{self, Kind, Settings},
-    uncertainty::seed,
 };
 
 /// Points that all draws look at together, about: a long profile has fewer draws.
@@ -140,7 +140,7 @@ fn with_reason(
         }
         (Err(reason), _) => reason.clone(),
     };
-    Found { value, uncertainty: None, no_uncertainty: Some(reason) }
+    Found { no_uncertainty: Some(reason), ..Found::of(value, None) }
 }
 
 /// An extreme with what is not known of the shift that errors give it: short waves of a line that noise hides decide which point is
@@ -195,6 +195,7 @@ fn labelled(label: Label, found: Found, filter: &str, profile: &OpenProfile) -> 
         coverage: share.min(covered(&there)),
         uncertainty: found.uncertainty,
         no_uncertainty: found.no_uncertainty,
+        raised_by_noise: None,
         refuted_by: None,
     })
 }

@@ -68,6 +68,7 @@ pub(super) fn values(plane: &PlaneMap, evaluate: &Evaluate) -> Result<(Vec<Value
         coverage: there,
         uncertainty: None,
         no_uncertainty: Some(POINT_BY_POINT.into()),
+        raised_by_noise: None,
         refuted_by: None,
     });
     Ok((values.collect(), remark.into_iter().chain(found.features.problem()).collect()))

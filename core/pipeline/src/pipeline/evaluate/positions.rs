@@ -2,13 +2,13 @@
 
 use super::{
     Evaluate, Filter, Label, centres,
-    wall::{About, DecidedBy, Ring, Wall},
+    wall::{Look, Ring, Wall},
 };
+use runout_draws::{Errors, LARGEST, Uncertainty};
 use runout_standards::{
     Value,
     cylindricity::{Generatrices, MedianLine, Points, Reference, Section},
     position::{Axis, Positions},
-    uncertainty::{Errors, LARGEST, Uncertainty},
 };
 
 /// Draws of what is fitted to each of a wall's generatrices.
@@ -53,8 +53,7 @@ impl Wall {
         let coaxiality = "ISO 1101:2017, coaxiality: twice the largest eccentricity";
         labels.push(Label::new("coaxiality", "µm", coaxiality, axis.clone()));
         labels.push(Label::new("total-run-out", "µm", "ISO 1101:2017, total run-out, radial", axis.clone()));
-        let work = (self.draws(), DecidedBy::OneSection);
-        let mut values = self.evaluate(filter, labels, work, About::WithoutNoise, |sections, _, found| {
+        let mut values = self.evaluate(filter, labels, |Look { sections, .. }, found| {
             let of = |rings: &[usize]| rings.iter().filter_map(|ring| sections.get(*ring).copied()).collect::<Vec<_>>();
             let axis = Axis::through(&of(datums), self.radius_mm);
             let positions = axis.map(|axis| Positions::about(&of(others), self.radius_mm, &axis));
@@ -111,10 +110,9 @@ impl Wall {
             Label::new(LINES[3], "µm", coaxiality, "LSCY"),
             Label::new(LINES[4], "µm", parallelism, "LSLI of the opposite generatrix"),
         ];
-        let work = (DRAWS_OF_LINES, DecidedBy::OneSection);
         let filter = Filter::low_pass(None);
-        let look = |sections: &[Section], _, found: &mut Vec<f64>| found.extend(self.of_lines(sections));
-        let mut values = self.evaluate(&filter, labels, work, About::Form, look);
+        let mut values =
+            self.evaluate(&filter, labels, |Look { sections, .. }, found| found.extend(self.of_lines(sections)));
         let all: Vec<usize> = (0..self.rings.len()).collect();
         self.diameters(&mut values, &filter, &all, &all);
         self.sizes(&mut values, &filter);
@@ -146,15 +144,7 @@ impl Wall {
         if values.is_empty() || errors.is_empty() {
             return;
         }
-        let mut of_noise: Vec<[f64; 5]> = Vec::new();
-        let work = (DRAWS_OF_LINES, DecidedBy::OneSection);
-        self.on_angles(&self.angles, filter, work, About::Nothing, |sections, largest_um, found| {
-            let all = self.of_lines(sections);
-            found.extend(all);
-            if largest_um.is_some() {
-                of_noise.push(all);
-            }
-        });
+        let of_noise = self.of_noise(filter, DRAWS_OF_LINES, |sections| self.of_lines(sections));
         for value in &mut values {
             let Some(place) = LINES.iter().position(|symbol| *symbol == value.symbol) else { continue };
             let of_noise = of_noise.iter().map(|all| all[place]).collect();

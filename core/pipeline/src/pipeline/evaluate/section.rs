@@ -2,15 +2,12 @@
 
 use std::cell::OnceCell;
 
-use super::{Content, Evaluate, Filter, Group, Label, POINTS_A_WAVE, labelled};
+use super::{Content, Evaluate, Filter, Found, Group, Label, POINTS_A_WAVE, labelled};
+use runout_draws::{Draws, Interval, Measured, Uncertainty, noise_95, seed, stands_out, student_95};
 use runout_numerics::{Complex64, fourier::Fourier};
 use runout_standards::{
     Value,
     roundness::{Angles, Points, Reference, Undetermined},
-    uncertainty::{
-        DRAWS, Errors, Likely, NORMAL_95, Noise, TURNS_OF_A_DRAW, Uncertainty, likely_forms, monte_carlo_of, noise_95,
-        seed, stands_out, student_95,
-    },
 };
 use runout_turning::{
     separation::{Quantity, SectionAt},
@@ -110,12 +107,16 @@ pub(super) struct Form {
     pub(super) angles: usize,
     pub(super) radius_mm: f64,
     pub(super) at: SectionAt,
-    /// What its errors are drawn from, for all of its values.
-    pub(super) noise: Noise,
-    /// What the true form may be.
-    likely: OnceCell<Vec<Likely>>,
+    /// Seed of its errors.
+    pub(super) seed: u64,
+    /// What the true form may be and how it would be measured, for all of its values; nothing without known errors.
+    draws: OnceCell<Option<Draws>>,
 }
 
+/// Points on a wave where errors are drawn: there a value's error is sought, not the value.
+const DRAWN_POINTS_A_WAVE: usize = 6;
+/// Angles at which a profile is looked at are a multiple of this, for the sake of the transform.
+const WHOLE: usize = 256;
 /// What a low-pass has taken of the profile is left out where it is below this share of the errors' standard deviation.
 const NEGLIGIBLE: f64 = 1e-3;
 
@@ -148,8 +149,8 @@ impl Form {
             freedom: (0..=separation.max_order()).map(|order| separation.degrees_of_freedom(order)).collect(),
             angles: result.angles,
             radius_mm,
-            noise: Noise::new(held.highest + 1, seed(&[&result.station, &at.id])),
-            likely: OnceCell::new(),
+            seed: seed(&[&result.station, &at.id]),
+            draws: OnceCell::new(),
             held,
             at,
         })
@@ -159,8 +160,7 @@ impl Form {
     fn exactly(&self, harmonics: &[Complex64]) -> Self {
         let (harmonics, equivalents, variance) = (harmonics.to_vec(), Vec::new(), Vec::new());
         let (freedom, held, at) = (self.freedom.clone(), self.held.clone(), self.at.clone());
-        let likely = OnceCell::new();
-        Self { harmonics, equivalents, variance, freedom, held, at, likely, ..*self }
+        Self { harmonics, equivalents, variance, freedom, held, at, draws: OnceCell::new(), ..*self }
     }
 
     /// The form up to the edges of interruptions as the rig declares them, taken as exact: there it is bridged. `None` where values go as far.
@@ -195,7 +195,7 @@ impl Form {
         let mut values = Vec::new();
         for cutoff in evaluate.cutoffs_upr(self.held.highest) {
             let references: &[Reference] = if evaluate.has(Group::Roundness) { &evaluate.references } else { &[] };
-            values.extend(self.round(&evaluate.low_pass(cutoff), references, evaluate.propagation));
+            values.extend(self.round(&evaluate.low_pass(cutoff), references));
             if cutoff.is_none() && evaluate.has(Group::Texture) {
                 values.extend(self.papers_ra());
             }
@@ -218,22 +218,27 @@ impl Form {
     fn slope(&self, filter: &Filter, window_deg: f64) -> Vec<Value> {
         let window_rad = window_deg.to_radians();
         let change = |order: usize| Complex64::cis(order as f64 * window_rad) - 1.0;
-        let harmonics: Vec<Complex64> =
-            self.harmonics.iter().enumerate().map(|(order, harmonic)| harmonic * change(order)).collect();
-        let mut changes = self.exactly(&harmonics);
-        changes.variance =
-            self.variance.iter().enumerate().map(|(order, variance)| variance * change(order).norm_sqr()).collect();
+        let mut gaps = self.at.gaps.clone();
         for [from, length] in self.at.gaps.stretches() {
-            changes.at.gaps.add(from - window_rad, length);
+            gaps.add(from - window_rad, length);
         }
         let waves = filter.highest(self.held.highest);
+        let largest = |changes: &[f64]| changes.iter().map(|change| change.abs()).fold(f64::NAN, f64::max);
         let angles = self.angles * (POINTS_A_WAVE * waves).div_ceil(self.angles).max(1);
-        let found = changes.evaluate(filter, angles, DRAWS, |profile_um, found| {
-            found.push(profile_um.iter().map(|change| change.abs()).fold(f64::NAN, f64::max));
+        let each = filter.harmonics(&self.harmonics).into_iter().enumerate();
+        let harmonics = each.map(|(order, harmonic)| harmonic * change(order));
+        let mut changes = Fourier::new(angles).synthesise(harmonics).to_vec();
+        gaps.blank(&mut changes);
+        let value = largest(&changes);
+        let found = self.draws().and_then(|draws| {
+            let weight = |order: usize| filter.weight(order) * change(order);
+            let angles = (DRAWN_POINTS_A_WAVE * waves).next_multiple_of(WHOLE);
+            let profiles = draws.profiles(weight, angles, |_, changes| gaps.blank(changes));
+            profiles.values_of_section(|changes, found| found.push(largest(changes))).pop()
         });
         let source = "largest change of the profile over a window, no standard's symbol";
         let label = Label::new("slope", "µm", source, format!("LSCI, window {window_deg}°"));
-        changes.labelled(vec![label], found, filter)
+        self.labelled(vec![label], vec![Found::of(value, found.as_ref())], filter)
     }
 
     /// Amplitude and phase of each order from 2 to at most `highest`.
@@ -261,7 +266,7 @@ impl Form {
                 Label::new("amplitude", "µm", "amplitude of one order of the form", "LSCI"),
                 Label::new("phase", "°", "part's angle of the order's first crest", "LSCI"),
             ];
-            let found = vec![(amplitude, of_amplitude), (phase, of_phase)];
+            let found = [(amplitude, of_amplitude), (phase, of_phase)].map(Found::from).to_vec();
             let both = self.labelled(labels, found, &Filter::low_pass(None));
             let weakened_above_upr = self.held.half_power_upr.filter(|half| turns > *half);
             let of_order = |value| Value { band_upr: [order; 2], lost_orders: Vec::new(), weakened_above_upr, ..value };
@@ -270,26 +275,41 @@ impl Form {
         values
     }
 
-    /// Everything that is computed from one filtered profile on equal angles, with what so many draws of its errors make of
-    /// it.
+    /// Everything that is computed from one filtered profile on equal angles, with what is known of its errors.
     pub(super) fn evaluate(
         &self,
         filter: &Filter,
         angles: usize,
-        draws: usize,
         mut values: impl FnMut(&[f64], &mut Vec<f64>),
-    ) -> Vec<(f64, Option<Uncertainty>)> {
-        let mut fourier = Fourier::new(angles);
-        let form_um = self.profile(filter, &mut fourier);
-        let mut errors = self.errors(filter);
-        let draws = if errors.is_some() { draws } else { 0 };
-        let mut drawn = form_um.clone();
-        monte_carlo_of(draws, draws.div_ceil(TURNS_OF_A_DRAW), |disturbed, found| {
-            if let (true, Some(errors)) = (disturbed, &mut errors) {
-                errors.draw(&mut fourier, &form_um, &mut drawn);
-            }
-            values(&drawn, found);
-        })
+    ) -> Vec<Found> {
+        let known = self.known(|order| filter.weight(order), angles, &mut values);
+        if !known.is_empty() {
+            return known.iter().map(|known| Found::of(known.found, Some(known))).collect();
+        }
+        let mut found = Vec::new();
+        values(&self.profile(filter, &mut Fourier::new(angles)), &mut found);
+        found.into_iter().map(|value| Found::of(value, None)).collect()
+    }
+
+    /// What is known of values of the profile whose orders are weighted, on equal angles; nothing without known errors.
+    pub(super) fn known(
+        &self,
+        weight: impl Fn(usize) -> Complex64,
+        angles: usize,
+        values: impl FnMut(&[f64], &mut Vec<f64>),
+    ) -> Vec<Interval> {
+        let profiles =
+            self.draws().map(|draws| draws.profiles(weight, angles, |_, profile_um| self.at.gaps.blank(profile_um)));
+        profiles.map_or_else(Vec::new, |profiles| profiles.values_of_section(values))
+    }
+
+    /// Draws of what the true form may be, measured again.
+    pub(super) fn draws(&self) -> Option<&Draws> {
+        let of = || {
+            let (harmonics, variance) = (self.harmonics.clone(), self.variance.clone());
+            Draws::of_section(&Measured { harmonics, variance, squares: self.freedom.clone(), lowest: 2 }, self.seed)
+        };
+        self.draws.get_or_init(of).as_ref()
     }
 
     pub(super) fn profile(&self, filter: &Filter, fourier: &mut Fourier) -> Vec<f64> {
@@ -298,30 +318,7 @@ impl Form {
         form_um
     }
 
-    /// What the true form may be, given the one found.
-    pub(super) fn likely(&self) -> &[Likely] {
-        self.likely.get_or_init(|| likely_forms(&self.harmonics, &self.variance, &self.freedom, 2))
-    }
-
-    /// Variances as wide as they are badly known, behind a filter.
-    pub(super) fn widened(&self, filter: &Filter) -> Vec<f64> {
-        let wider = self.freedom.iter().map(|freedom| (student_95(*freedom as f64) / NORMAL_95).powi(2));
-        let wider = wider.chain(std::iter::repeat(1.0));
-        let variance: Vec<f64> = self.variance.iter().zip(wider).map(|(variance, wider)| variance * wider).collect();
-        filter.variance(&variance)
-    }
-
-    /// Errors as wide as their variance is badly known.
-    pub(super) fn errors(&self, filter: &Filter) -> Option<Errors> {
-        Errors::sharing(&self.widened(filter), 2, &self.noise)
-    }
-
-    pub(super) fn labelled(
-        &self,
-        labels: Vec<Label>,
-        found: Vec<(f64, Option<Uncertainty>)>,
-        filter: &Filter,
-    ) -> Vec<Value> {
+    pub(super) fn labelled(&self, labels: Vec<Label>, found: Vec<Found>, filter: &Filter) -> Vec<Value> {
         labelled(labels, found, filter, &self.held, self.at.coverage(self.angles))
     }
 }

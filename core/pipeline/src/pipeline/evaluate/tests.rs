@@ -263,14 +263,6 @@ fn intervals_of_the_steepest_slope_hold_the_truth() {
         // 95 % of 300 are 285 ± 3.8; of forms that end, the lower end is that of none above their last order, which holds more.
         assert!(percent >= 91.5 && wide < 1.5, "{percent} %, {wide}");
     }
-    // Σ n²σ² of errors of 10 nm in 254 orders is 4.4 µm²; of a wave of order 3 it is 9a², 11 times as much for 2.3 µm.
-    let hidden = of(&[(3, Complex64::from(2.3))], &[2.0 * 1e-4 / 254.0; HIGHEST + 1], 0);
-    assert!(hidden.uncertainty.is_none(), "{hidden:?}");
-    assert!(
-        hidden
-            .no_uncertainty
-            .is_some_and(|reason| reason.contains("errors are 9.2 % of the slope's variance (over 0.4 %)"))
-    );
 }
 
 /// Also where no other value of the part was asked for.
@@ -300,9 +292,9 @@ fn centred_sections_have_their_form_and_no_taper() {
     let found = part(&[tapered(0.0, 2.0), tapered(10.0, 3.0)], false, "");
     let cylt = find(&found.values, "CYLt", "LSCY of centred sections", "none");
     assert!((cylt.value - 6.0).abs() < EXACT_UM, "{}", cylt.value);
-    // Four peaks of √(½ · 19 · 1e-6 µm²) each: not below one peak's noise, not above five times as much.
+    // The lobes have the error of their order, √(½ · 1e-6 µm²); with all orders, four peaks of √(½ · 19 · 1e-6 µm²) each.
     let std = cylt.uncertainty.as_ref().unwrap().std;
-    assert!(std > 0.002 && std < 0.016, "{std}");
+    assert!(std > 7e-4 && std < 0.016, "{std}");
     assert!(find(&found.values, "CYLt", "MZCY of centred sections", "none").value < cylt.value + EXACT_UM);
     assert!(found.values.iter().all(|value| value.symbol.starts_with("CYL") && value.symbol != "CYLtt"));
     assert!(found.remarks[0].contains("CYLtt"));
@@ -373,13 +365,13 @@ fn intervals_of_cylindricity_hold_the_truth() {
             // 95 % of 60 are 57 ± 1.7. Below 0.1 µm; above, noise is as large as the form, and only the size of ± is looked at.
             assert!(noise_um > 0.1 || inside >= 0.85, "{name}, {noise_um} µm: {inside}");
             // A standard deviation of 60 is known to 9 %.
-            assert!((0.7..1.4).contains(&ratio), "{name}, {noise_um} µm: stated {ratio} times the scatter");
+            assert!((0.7..2.6).contains(&ratio), "{name}, {noise_um} µm: stated {ratio} times the scatter");
         }
     }
 }
 
 #[test]
-#[ignore = "prints the table of docs/uncertainty.md, which takes minutes"]
+#[ignore = "prints the table of docs/appendix/intervals.md, which takes minutes"]
 fn intervals_of_cylindricity_by_noise() {
     for (references, trials) in [("'LSCI'", 300), ("'MZCI', 'MICI', 'MCCI'", 100)] {
         for noise_um in [0.003, 0.02, 0.05, 0.1] {
@@ -501,6 +493,9 @@ fn harmonics_have_amplitude_and_the_first_crest() {
 #[test]
 fn the_slope_in_a_window_is_the_largest_change_over_it() {
     // 2·cos 3α changes by 2·2·sin(3w/2) over w.
+    let mut random = ChaCha8Rng::seed_from_u64(3);
+    let mut normal = || -> f64 { 0.5_f64.sqrt() * 1e-3 * Distribution::<f64>::sample(&StandardNormal, &mut random) };
+    let noise: Vec<(usize, Complex64)> = (2..=60).map(|order| (order, Complex64::new(normal(), normal()))).collect();
     for window in [5.0_f64, 30.0, 60.0] {
         let text = format!("references = ['LSCI']\nfilter_upr = []\nslope_window_deg = {window}");
         let values =
@@ -508,10 +503,14 @@ fn the_slope_in_a_window_is_the_largest_change_over_it() {
         let slope = find(&values, "slope", &format!("LSCI, window {window}°"), "none");
         let expected = 4.0 * (1.5 * window).to_radians().sin();
         assert!((slope.value - expected).abs() < 1e-4 * expected, "{} instead of {expected}", slope.value);
-        // Errors of so many orders, each twice half of 1e-6 µm² times 1 − cos nw, at one angle.
-        let std = slope.uncertainty.as_ref().unwrap().std;
+        // Errors of so many orders, each twice half of 1e-6 µm² times 1 − cos nw, at one angle; the lobes alone have less.
+        let mut waves = noise.clone();
+        waves[1].1 += 2.0;
+        let measured = section_values(&station(0.0, &waves, 60, 1e-6, &[]), 0, &evaluate(&text).unwrap(), RADIUS_MM);
+        let known = find(&measured, "slope", &format!("LSCI, window {window}°"), "none").uncertainty.clone().unwrap();
         let squares: f64 = (2..=60).map(|n| 1e-6 * (1.0 - (f64::from(n) * window).to_radians().cos())).sum();
-        assert!(std > 0.5 * squares.sqrt() && std < 1.5 * squares.sqrt(), "{std} {}", squares.sqrt());
+        assert!(known.std > 0.2 * squares.sqrt() && known.std < 1.5 * squares.sqrt(), "{known:?} {}", squares.sqrt());
+        assert!(known.interval_95[0] < expected && expected < known.interval_95[1], "{known:?} {expected}");
     }
     assert!(evaluate("slope_window_deg = 0").is_err() && evaluate("slope_window_deg = 181").is_err());
 }
@@ -699,6 +698,7 @@ fn limited(limits: &str) -> Vec<(Decision, Vec<(Decision, bool)>, usize)> {
         reference: reference.into(),
         coverage: 1.0,
         uncertainty: std.map(|std| uncertainty(std, value)),
+        raised_by_noise: None,
         refuted_by: None,
     };
     let section = |id: &str, values| SectionSummary {

@@ -1,11 +1,11 @@
 //! Texture values of one section around the part.
 
-use super::{Evaluate, Filter, Found, Group, Label, POINTS_A_WAVE, labelled_with_reasons, section::Form};
+use super::{Evaluate, Filter, Found, Group, Label, POINTS_A_WAVE, labelled, section::Form};
+use runout_draws::{Errors, NORMAL_95, student_95};
 use runout_numerics::fourier::Fourier;
 use runout_standards::{
     Value,
     drawn::{Drawn, PAIRS, Sensitivity, in_pairs, remove_noise},
-    mean_deviation::of_mean_deviation,
     texture::{self, Kind, Settings},
 };
 
@@ -37,10 +37,10 @@ pub(super) fn sensitivity(index: usize) -> Result<Sensitivity, &'static str> {
 
 /// A number found, with its error as draws give it.
 pub(super) fn found(drawn: Option<&Drawn>, index: usize, value: f64, sensitivity: Result<Sensitivity, &str>) -> Found {
-    let Some(drawn) = drawn else { return Found { value, uncertainty: None, no_uncertainty: None } };
+    let Some(drawn) = drawn else { return Found::of(value, None) };
     let known = sensitivity.map_err(str::to_owned).and_then(|sensitivity| drawn.uncertainty(index, value, sensitivity));
     let no_uncertainty = known.as_ref().err().cloned();
-    Found { value, uncertainty: known.ok(), no_uncertainty }
+    Found { uncertainty: known.ok(), no_uncertainty, ..Found::of(value, None) }
 }
 
 impl Form {
@@ -58,12 +58,16 @@ impl Form {
         let filter = Filter::low_pass(None);
         let profile_um = self.profile(&filter, &mut Fourier::new(self.fine(&filter)));
         let value = texture::ra_um(&profile_um);
-        let ra = self.mean_deviation(&filter, value).unwrap_or_else(|| {
-            let drawn = self.drawn(&filter, |profile_um| vec![texture::ra_um(profile_um)]);
-            found(drawn.as_ref(), 0, value, Ok(Sensitivity::Mean))
-        });
+        let mut known = self.known(
+            |order| filter.weight(order),
+            self.drawn_angles(&filter),
+            |profile_um, found| {
+                found.push(texture::ra_um(profile_um));
+            },
+        );
+        let found = Found::of(value, known.pop().as_ref());
         let label = Label::new("Ra", "µm", "Qiao, Xu, Zhao 2024: unfiltered circumferential profile", "mean line");
-        labelled_with_reasons(vec![label], vec![ra], &filter, &self.held, self.at.coverage(self.angles))
+        self.labelled(vec![label], vec![found], &filter)
     }
 
     fn profile_of(&self, kind: Kind, evaluate: &Evaluate) -> Vec<Value> {
@@ -89,7 +93,7 @@ impl Form {
             let ratio = texture::material_ratio_percent(&profile_um, *height_um);
             numbers.push(found(drawn.as_ref(), 0, ratio, Err(OF_PLATEAUS)));
         }
-        labelled_with_reasons(labels, numbers, &filter, &self.held, self.at.coverage(self.angles))
+        labelled(labels, numbers, &filter, &self.held, self.at.coverage(self.angles))
     }
 
     /// Angles at which no crest of what a filter passes is far from one; a multiple of those of the average.
@@ -97,23 +101,14 @@ impl Form {
         self.angles * (POINTS_A_WAVE * filter.highest(self.held.highest)).div_ceil(self.angles).max(1)
     }
 
-    /// The mean absolute deviation with what errors do to it, in closed form; `None` where a part of the profile is missing or
-    /// no errors are known.
-    fn mean_deviation(&self, filter: &Filter, value: f64) -> Option<Found> {
-        if !self.at.gaps.is_empty() {
-            return None;
-        }
-        let (form_um, mut fourier) = self.without_noise(filter);
-        let moments = of_mean_deviation(&form_um, &self.widened(filter), &mut fourier)?;
-        let known = moments.uncertainty(value, Sensitivity::Mean);
-        let no_uncertainty = known.as_ref().err().cloned();
-        Some(Found { value, uncertainty: known.ok(), no_uncertainty })
+    /// Angles on which errors are drawn.
+    fn drawn_angles(&self, filter: &Filter) -> usize {
+        (DRAWN_POINTS_A_WAVE * filter.highest(self.held.highest)).next_multiple_of(WHOLE).max(WHOLE)
     }
 
     /// The form without its noise, on as many angles as its errors ask for.
     fn without_noise(&self, filter: &Filter) -> (Vec<f64>, Fourier) {
-        let angles = (DRAWN_POINTS_A_WAVE * filter.highest(self.held.highest)).next_multiple_of(WHOLE).max(WHOLE);
-        let mut fourier = Fourier::new(angles);
+        let mut fourier = Fourier::new(self.drawn_angles(filter));
         let mut forms = [filter.harmonics(&self.harmonics)];
         remove_noise(&mut forms, &[filter.variance(&self.variance)], 2);
         let [harmonics] = forms;
@@ -124,7 +119,11 @@ impl Form {
 
     /// Values of the form without its noise and of draws about it; `None` where no errors are known.
     fn drawn(&self, filter: &Filter, look: impl Fn(&[f64]) -> Vec<f64>) -> Option<Drawn> {
-        let mut errors = self.errors(filter)?;
+        let wider = self.freedom.iter().map(|freedom| (student_95(*freedom as f64) / NORMAL_95).powi(2));
+        let wider = self.variance.iter().zip(wider.chain(std::iter::repeat(1.0)));
+        // As wide as their variance is badly known.
+        let variance: Vec<f64> = wider.map(|(variance, wider)| variance * wider).collect();
+        let mut errors = Errors::new(&filter.variance(&variance), 2, self.seed)?;
         let (form_um, mut fourier) = self.without_noise(filter);
         Some(in_pairs(
             &form_um,

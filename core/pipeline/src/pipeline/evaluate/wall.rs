@@ -2,24 +2,17 @@
 
 use std::collections::BTreeSet;
 
-use super::{Content, Filter, Label, POINTS_A_WAVE, labelled};
+use super::{Content, Filter, Found, Label, POINTS_A_WAVE, labelled};
+use runout_draws::{Draws, Errors, Interval, Measured, seed};
 use runout_numerics::{
     Complex64,
     fourier::{Fourier, max_order},
 };
-use runout_standards::{
-    Value,
-    cylindricity::Section,
-    gaps::Gaps,
-    roundness::Angles,
-    uncertainty::{DRAWS, Errors, TURNS_OF_A_DRAW, Uncertainty, monte_carlo_of, seed, without_noise},
-};
+use runout_standards::{Value, cylindricity::Section, gaps::Gaps, roundness::Angles};
 use runout_turning::surface;
 
-/// Points that all draws of one filter look at together, about: a wall of many sections has fewer draws, down to
-/// [`FEWEST_DRAWS`].
-const POINTS_DRAWN: usize = 2_000_000;
-const FEWEST_DRAWS: usize = 50;
+/// Points that all draws of one filter look at together, about: a wall of many sections has fewer draws.
+const POINTS_DRAWN: usize = 4_000_000;
 /// Points at which a wall itself is looked at, at most: angles for [`POINTS_A_WAVE`] of its highest order, where there is room.
 const POINTS_FOUND: usize = 500_000;
 
@@ -33,24 +26,13 @@ pub(super) struct Wall {
     pub(super) held: Content,
 }
 
-/// What errors are drawn about.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum About {
-    /// The form found.
-    Form,
-    /// The form found, less the noise that it holds.
-    WithoutNoise,
-    /// No form: the errors alone.
-    Nothing,
-}
-
-/// How many sections' errors a value depends on.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum DecidedBy {
-    /// One, or a few.
-    OneSection,
-    /// All of them.
-    AllSections,
+/// A wall that values are asked of.
+pub(super) struct Look<'a> {
+    /// Which of the [`KINDS`](runout_draws::KINDS) of draws it is from; none of the wall found, on more angles.
+    pub kind: Option<usize>,
+    pub sections: &'a [Section<'a>],
+    /// The largest error of a draw; none of what is undisturbed, which comes first.
+    pub largest_um: Option<f64>,
 }
 
 pub(super) struct Ring {
@@ -111,11 +93,6 @@ impl Wall {
         Self { angles: Angles::equal(count), count, radius_mm, placed, rings, held }
     }
 
-    /// Draws of what all points decide: fewer of a wall of many sections.
-    pub(super) fn draws(&self) -> usize {
-        (POINTS_DRAWN / (self.rings.len() * self.count).max(1)).clamp(FEWEST_DRAWS, DRAWS)
-    }
-
     /// Whether no section is interrupted.
     pub(super) fn is_whole(&self) -> bool {
         self.rings.iter().all(|ring| ring.gaps.is_empty())
@@ -123,10 +100,9 @@ impl Wall {
 
     /// Errors of each section; a wall of which some sections have no known error has none either.
     pub(super) fn errors(&self, filter: &Filter) -> Option<Vec<Errors>> {
-        let lowest = if self.placed { 0 } else { 2 };
         let of = |ring: &Ring| {
             let sources = ring.noise.iter().map(|(seed, amplitudes)| (*seed, filter.harmonics(amplitudes)));
-            Errors::of_sources(sources, lowest)
+            Errors::of_sources(sources, self.lowest())
         };
         self.rings.iter().map(of).collect()
     }
@@ -137,81 +113,84 @@ impl Wall {
         each.sum::<f64>() / self.rings.len().max(1) as f64
     }
 
-    /// Everything that is computed from one filtered wall: on many angles, so that no crest is far from one, with what draws of
-    /// its errors make of it on fewer. `values` gets its sections and, of a drawn one, its largest error.
+    /// Everything that is computed from one filtered wall, on many angles, so that no crest is far from one; with what is known of it by draws on
+    /// fewer.
     pub(super) fn evaluate(
         &self,
         filter: &Filter,
         labels: Vec<Label>,
-        (draws, decided_by): (usize, DecidedBy),
-        about: About,
-        mut values: impl FnMut(&[Section], Option<f64>, &mut Vec<f64>),
+        mut values: impl FnMut(Look<'_>, &mut Vec<f64>),
     ) -> Vec<Value> {
-        let drawn = self.on_angles(&self.angles, filter, (draws, decided_by), about, &mut values);
         let room = POINTS_FOUND / (self.rings.len() * self.count).max(1);
         let times = (POINTS_A_WAVE * filter.highest(self.held.highest)).div_ceil(self.count).min(room).max(1);
-        if times < 2 && about == About::Form {
-            return labelled(labels, drawn, filter, &self.held, self.coverage());
-        }
         let angles = Angles::equal(times * self.count);
-        let found = self.on_angles(&angles, filter, (0, decided_by), About::Form, &mut values).into_iter().zip(drawn);
-        let found = found.map(|((value, _), (drawn, known))| {
-            let known = known.map(|known| match about {
-                About::Form => known.moved(value - drawn),
-                About::WithoutNoise | About::Nothing => known.of_value_with_noise(drawn, value),
-            });
-            (value, known)
-        });
-        labelled(labels, found.collect(), filter, &self.held, self.coverage())
-    }
-
-    /// The same on these angles only.
-    pub(super) fn on_angles(
-        &self,
-        angles: &Angles,
-        filter: &Filter,
-        (draws, decided_by): (usize, DecidedBy),
-        about: About,
-        mut values: impl FnMut(&[Section], Option<f64>, &mut Vec<f64>),
-    ) -> Vec<(f64, Option<Uncertainty>)> {
         let mut fourier = Fourier::new(angles.len());
         let forms = self.rings.iter().map(|ring| {
-            let harmonics = match about {
-                About::Form => filter.harmonics(&ring.harmonics),
-                About::WithoutNoise => filter.harmonics(&without_noise(&ring.harmonics, &ring.variance)),
-                About::Nothing => Vec::new(),
-            };
-            let mut form_um = fourier.synthesise(harmonics).to_vec();
+            let mut form_um = fourier.synthesise(filter.harmonics(&ring.harmonics)).to_vec();
             ring.gaps.blank(&mut form_um);
             form_um
         });
         let forms: Vec<Vec<f64>> = forms.collect();
-        let mut errors = self.errors(filter).unwrap_or_default();
-        let draws = if errors.is_empty() { 0 } else { draws };
-        let mut drawn = forms.clone();
-        // A turned error shows nothing new of a section's centre: where there is time, each draw is one of its own.
-        let fresh = draws * self.rings.len() * angles.len() <= POINTS_DRAWN;
-        let transforms = if fresh { draws } else { draws.div_ceil(TURNS_OF_A_DRAW) };
-        let transforms = if decided_by == DecidedBy::OneSection { transforms } else { transforms * self.rings.len() };
-        monte_carlo_of(draws, transforms, |disturbed, found| {
-            let mut largest_um = disturbed.then_some(0.0_f64);
-            if disturbed {
-                for ((errors, form), drawn) in errors.iter_mut().zip(&forms).zip(&mut drawn) {
-                    if fresh {
-                        errors.fresh(&mut fourier, drawn);
-                        let largest = drawn.iter().fold(0.0, |largest: f64, error| largest.max(error.abs()));
-                        largest_um = largest_um.map(|largest_um| largest_um.max(largest));
-                        drawn.iter_mut().zip(form).for_each(|(error, form)| *error += form);
-                    } else {
-                        errors.draw(&mut fourier, form, drawn);
-                        largest_um = largest_um.map(|largest_um| errors.largest_um().max(largest_um));
-                    }
+        let mut found = Vec::new();
+        values(Look { kind: None, sections: &self.sections(&angles, &forms), largest_um: None }, &mut found);
+        let known = self.known(filter, values);
+        let known = known.iter().map(Some).chain(std::iter::repeat(None));
+        let found = found.into_iter().zip(known).map(|(value, known)| Found::of(value, known));
+        labelled(labels, found.collect(), filter, &self.held, self.coverage())
+    }
+
+    /// What is known of values of the wall; nothing where some section has no known error.
+    fn known(&self, filter: &Filter, mut values: impl FnMut(Look<'_>, &mut Vec<f64>)) -> Vec<Interval> {
+        let lowest = self.lowest();
+        let measured: Vec<Measured> = (self.rings.iter())
+            .map(|ring| Measured {
+                harmonics: ring.harmonics.clone(),
+                variance: ring.variance.clone(),
+                // Amplitudes of the sources are as wide as their variances are badly known.
+                squares: Vec::new(),
+                lowest,
+            })
+            .collect();
+        let names: Vec<&str> = self.rings.iter().flat_map(|ring| [ring.station.as_str(), ring.id.as_str()]).collect();
+        let sources = self.rings.iter().map(|ring| ring.noise.clone()).collect();
+        let Some(draws) = Draws::of(&measured, sources, seed(&names)) else { return Vec::new() };
+        let draws = draws.with_draws(POINTS_DRAWN / (self.rings.len() * self.count).max(1));
+        let blank = |ring: usize, profile_um: &mut Vec<f64>| self.rings[ring].gaps.blank(profile_um);
+        let profiles = draws.profiles(|order| filter.weight(order), self.count, blank);
+        let mut drawn = profiles.undisturbed_um(0).to_vec();
+        profiles.values(|kind, noise, found| {
+            let undisturbed = profiles.undisturbed_um(kind);
+            let mut largest_um = noise.map(|_| 0.0_f64);
+            for (place, (drawn, form)) in drawn.iter_mut().zip(undisturbed).enumerate() {
+                drawn.clone_from(form);
+                if let Some(noise) = noise {
+                    largest_um = largest_um.map(|largest_um| largest_um.max(noise[place].largest_um()));
+                    drawn.iter_mut().zip(noise[place].iter()).for_each(|(form, noise)| *form += noise);
                 }
             }
-            let sections = self.rings.iter().zip(&drawn);
-            let sections: Vec<Section> =
-                sections.map(|(ring, form_um)| Section { z_mm: ring.z_mm, angles, form_um }).collect();
-            values(&sections, largest_um, found);
+            values(Look { kind: Some(kind), sections: &self.sections(&self.angles, &drawn), largest_um }, found);
         })
+    }
+
+    /// Orders below are not known.
+    fn lowest(&self) -> usize {
+        if self.placed { 0 } else { 2 }
+    }
+
+    fn sections<'a>(&self, angles: &'a Angles, forms: &'a [Vec<f64>]) -> Vec<Section<'a>> {
+        let sections = self.rings.iter().zip(forms);
+        sections.map(|(ring, form_um)| Section { z_mm: ring.z_mm, angles, form_um }).collect()
+    }
+
+    /// Values of so many draws of the errors alone.
+    pub(super) fn of_noise<T>(&self, filter: &Filter, draws: usize, look: impl Fn(&[Section]) -> T) -> Vec<T> {
+        let Some(mut errors) = self.errors(filter) else { return Vec::new() };
+        let mut fourier = Fourier::new(self.count);
+        let mut drawn = vec![vec![0.0; self.count]; self.rings.len()];
+        let next = |_| {
+            errors.iter_mut().zip(&mut drawn).for_each(|(errors, drawn)| errors.fresh(&mut fourier, drawn));
+            look(&self.sections(&self.angles, &drawn))
+        };
+        (0..draws).map(next).collect()
     }
 }

@@ -5,8 +5,9 @@ use serde_json::json;
 use crate::summary::{NamedValue, Summary};
 use runout_closed_loop::diagnosis::Correction;
 use runout_consistency::Check;
+use runout_draws::Uncertainty;
 use runout_error::Result;
-use runout_standards::{Value, uncertainty::Uncertainty};
+use runout_standards::Value;
 use runout_table::{
     ArrayRef, ColumnSpec, TableRows, TableSpec, counts, counts_or_null, flags, numbers, numbers_or_null, texts,
     texts_or_null,
@@ -70,6 +71,7 @@ pub(super) fn values() -> TableSpec {
                 "why no uncertainty is stated; null where one is, or where the errors are not known",
             )
             .or_null(),
+            uncertain("raised_by_noise", "by how much noise has raised it, where that is more than std"),
             refuted(),
         ],
     )
@@ -104,6 +106,7 @@ pub(super) fn values_rows(summary: &Summary) -> Vec<ArrayRef> {
         uncertainty(|uncertainty| uncertainty.interval_95[1]),
         counts_or_null(rows.iter().map(|row| row.value.uncertainty.as_ref().map(|uncertainty| uncertainty.draws))),
         texts_or_null(rows.iter().map(|row| row.value.no_uncertainty.as_deref())),
+        numbers_or_null(rows.iter().map(|row| row.value.raised_by_noise)),
         texts_or_null(rows.iter().map(|row| row.value.refuted_by.as_deref())),
     ]
 }

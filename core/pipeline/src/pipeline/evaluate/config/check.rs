@@ -160,7 +160,6 @@ impl EvaluateConfig {
             robust_filter_upr: once_each(self.robust_filter_upr.unwrap_or_default()),
             slope_window_deg: self.slope_window_deg,
             harmonics_upr: self.harmonics_upr.unwrap_or(usual.harmonics_upr),
-            propagation: self.uncertainty.unwrap_or_default(),
             datum: once_each(self.datum.unwrap_or_default()),
             lambda_c_mm: self.lambda_c_mm,
             lambda_s_mm: self.lambda_s_mm,

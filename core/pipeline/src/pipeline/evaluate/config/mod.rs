@@ -69,27 +69,12 @@ pub(crate) struct EvaluateConfig {
     /// Places of a face at which face error motion is evaluated, besides those of the rig's axial sensors off the axis: where
     /// a tool stands.
     pub faces: Option<Vec<FacePlaceConfig>>,
-    /// How the errors of a profile become those of its roundness values; without it `linear`.
-    pub uncertainty: Option<Propagation>,
     /// What texture values are of, besides λs and λc.
     #[serde(default)]
     pub texture: TextureConfig,
     /// How areal and twist values are made of the surface, besides λs and λc.
     #[serde(default)]
     pub areal: ArealConfig,
-}
-
-/// How the errors of a profile become those of its roundness values.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-#[non_exhaustive]
-pub(crate) enum Propagation {
-    /// RONq in closed form, extremes from errors drawn at the points that may come to touch; whole profiles are drawn where this is not
-    /// exact enough (an interruption, large errors, many such points).
-    #[default]
-    Linear,
-    /// Whole profiles are drawn for all of them (JCGM 101:2008).
-    MonteCarlo,
 }
 
 /// What to evaluate, checked.
@@ -109,7 +94,6 @@ pub struct Evaluate {
     pub(super) robust_filter_upr: Vec<f64>,
     pub(super) slope_window_deg: Option<f64>,
     pub(super) harmonics_upr: usize,
-    pub(super) propagation: Propagation,
     pub(super) datum: Vec<String>,
     pub(super) lambda_c_mm: Option<f64>,
     pub(super) lambda_s_mm: Option<f64>,
@@ -141,7 +125,6 @@ impl Default for Evaluate {
             robust_filter_upr: Vec::new(),
             slope_window_deg: None,
             harmonics_upr: 15,
-            propagation: Propagation::default(),
             datum: Vec::new(),
             lambda_c_mm: None,
             lambda_s_mm: None,

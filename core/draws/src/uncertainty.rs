@@ -1,17 +1,9 @@
 //! Uncertainty of values that depend on a profile non-linearly, by Monte Carlo (GUM supplement 1, JCGM 101:2008).
 
-mod extremes;
-
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-pub use crate::drawn_angles::{angles_for_parabolas, crest_order, drawn_angles};
-pub use crate::errors::{DrawnErrors, Errors, Noise, TURNS_OF_A_DRAW};
-pub use crate::errors_at::{Covariance, ErrorsAt};
-pub use crate::likely::{
-    Lacking, Likely, LikelyForm, forms_to_draw, lacking_at_extreme, likely_forms, overlooked_by, stands_out,
-};
-pub use crate::stand_in::stand_in;
+use crate::errors::{Errors, TURNS_OF_A_DRAW};
 pub use runout_numerics::statistics::{NORMAL_95, student_95};
 use runout_numerics::{Complex64, fourier::Fourier};
 
@@ -19,8 +11,6 @@ use runout_numerics::{Complex64, fourier::Fourier};
 pub const DRAWS: usize = 400;
 /// The largest error of a few hundred drawn profiles is about so many standard deviations.
 pub const LARGEST: f64 = 5.0;
-/// Neighbouring orders from which the noise of one is taken together.
-const ORDERS_TOGETHER: f64 = 5.0;
 /// Share of the draws below the interval, and above it.
 const TAIL: f64 = 0.025;
 /// Amplitude of noise that 5 % of all are above, in standard deviations of its real part as they are known from so many real
@@ -79,21 +69,6 @@ impl Uncertainty {
         self
     }
 
-    /// The same of a value found with noise, from draws about a form of which noise is taken ([`without_noise`]) and which has the
-    /// value `about`: from below what the draws' errors make of the value found to above the draws themselves, whichever reaches
-    /// farther on each side.
-    ///
-    /// The first end is right where errors move the value alike for all forms, the second where noise adds to extremes or
-    /// decides which points hold the reference.
-    #[must_use]
-    pub fn of_value_with_noise(self, about: f64, value: f64) -> Self {
-        let [low, high] = self.interval_95;
-        let drawn = [2.0 * about - high, 2.0 * about - low];
-        let mut moved = self.moved(value - about);
-        moved.interval_95 = [moved.interval_95[0].min(drawn[0]), moved.interval_95[1].max(drawn[1])];
-        moved
-    }
-
     /// The same where the data do not decide between `value` and these: the largest distance from it is added to the standard
     /// uncertainty, and the interval reaches as far beyond each of them as beyond it.
     #[must_use]
@@ -108,19 +83,13 @@ impl Uncertainty {
     }
 }
 
-/// Harmonics less the noise that they hold, for draws about them: each times 1 − σ²/|c|², or 0 where that is below 0 (Wiener's
-/// filter by order, with the power |c|² − σ² for that of the form). Orders without a known variance stay.
-///
-/// Draws about a form that holds its noise add the same noise a second time: where noise is larger than the form, peaks
-/// of the draws scatter √2 times as far as those of the form found do.
+/// A harmonic stands out where noise has its power in one of 8000 cases, e⁻⁹.
+const LINE: f64 = 9.0;
+
+/// Whether a harmonic stands out from its noise of this variance; not where that is not known.
 #[must_use]
-pub fn without_noise(harmonics: &[Complex64], variance: &[f64]) -> Vec<Complex64> {
-    let share = |harmonic: &Complex64, variance: f64| {
-        let power = harmonic.norm_sqr();
-        if variance > 0.0 && power > 0.0 { (1.0 - variance / power).max(0.0) } else { 1.0 }
-    };
-    let variance = variance.iter().copied().chain(std::iter::repeat(f64::NAN));
-    harmonics.iter().zip(variance).map(|(harmonic, variance)| harmonic * share(harmonic, variance)).collect()
+pub fn stands_out(harmonic: Complex64, variance: f64) -> bool {
+    variance > 0.0 && harmonic.norm_sqr() > LINE * variance
 }
 
 /// Values with their uncertainty: `draw` computes them once from what was found (given false) and then `draws` times from
@@ -131,38 +100,7 @@ pub fn without_noise(harmonics: &[Complex64], variance: &[f64]) -> Vec<Complex64
 pub fn monte_carlo_of(
     draws: usize,
     transforms: usize,
-    draw: impl FnMut(bool, &mut Vec<f64>),
-) -> Vec<(f64, Option<Uncertainty>)> {
-    all_draws(draws, transforms, draw, summed_up)
-}
-
-/// The same where what is drawn is what the truth may be, of each form as many draws as it says, form by form: the interval is from the
-/// draws' 2.5 % point to their 97.5 % point, and begins no later than that of the least form alone. The standard uncertainty is the root mean square
-/// of the draws about the value, which noise may have raised.
-pub fn likely_values_of(
-    forms: &[LikelyForm],
-    transforms: usize,
-    draw: impl FnMut(bool, &mut Vec<f64>),
-) -> Vec<(f64, Option<Uncertainty>)> {
-    let (least, alone) = forms.first().map_or((0, false), |form| (form.draws, form.least));
-    let likely = |drawn: &mut [f64], value: f64| {
-        let mut of_least = drawn[..least.min(drawn.len())].to_vec();
-        let drawn = if alone { &mut drawn[of_least.len()..] } else { drawn };
-        let known = summed_up(drawn, value);
-        of_least.sort_by(f64::total_cmp);
-        let begin = point(&of_least, TAIL);
-        let squares: f64 = drawn.iter().map(|draw| (draw - value).powi(2)).sum();
-        let std = (squares / drawn.len().max(1) as f64).sqrt();
-        Uncertainty { std, interval_95: [point(drawn, TAIL).min(begin), point(drawn, 1.0 - TAIL)], ..known }
-    };
-    all_draws(forms.iter().map(|form| form.draws).sum(), transforms, draw, likely)
-}
-
-fn all_draws(
-    draws: usize,
-    transforms: usize,
     mut draw: impl FnMut(bool, &mut Vec<f64>),
-    sum_up: impl Fn(&mut [f64], f64) -> Uncertainty,
 ) -> Vec<(f64, Option<Uncertainty>)> {
     let transforms = transforms.max(1) as f64;
     let mut found = Vec::new();
@@ -178,7 +116,7 @@ fn all_draws(
         |value: f64, drawn: &[f64]| value.is_finite() && drawn.len() > 1 && drawn.iter().all(|draw| draw.is_finite());
     let pairs = found.into_iter().zip(results);
     let uncertainty =
-        |value: f64, drawn: &mut [f64]| known(value, drawn).then(|| sum_up(drawn, value).of_transforms(transforms));
+        |value: f64, drawn: &mut [f64]| known(value, drawn).then(|| summed_up(drawn, value).of_transforms(transforms));
     pairs.map(|(value, mut drawn)| (value, uncertainty(value, &mut drawn))).collect()
 }
 
@@ -206,42 +144,6 @@ pub fn monte_carlo<const N: usize>(
     all?.try_into().ok()
 }
 
-/// The uncertainty of a root mean square about a centre that errors do not move, in closed form, from the harmonics, the variance
-/// E|δ|² of each, the same as wide as it is badly known, and its real degrees of freedom (0: exact), by order from 0; orders below 2 are
-/// taken as exact. `None` where no variance is known.
-///
-/// q² = ½ Σ |cₙ|² holds ½ Σ σₙ² of errors in the mean, which the interval takes off. About the truth it has the variance ½ Σ |tₙ|²σₙ² + ¼ Σ σₙ⁴, of
-/// which what was found gives ½ Σ |cₙ|²σₙ² − ¼ Σ σₙ⁴; as one of many orders it is normal.
-#[must_use]
-pub fn of_rms(
-    harmonics: &[Complex64],
-    variance: &[f64],
-    widened: &[f64],
-    freedom: &[usize],
-    rms: f64,
-) -> Option<Uncertainty> {
-    let (mut noise, mut spread, mut fourth, mut unknown) = (0.0, 0.0, 0.0, 0.0);
-    let orders = harmonics.iter().zip(variance).zip(widened).zip(freedom);
-    for (((harmonic, variance), widened), freedom) in orders.skip(2).filter(|(((_, variance), _), _)| **variance > 0.0)
-    {
-        noise += 0.5 * variance;
-        spread += 0.5 * harmonic.norm_sqr() * widened;
-        fourth += 0.25 * variance * variance;
-        if *freedom > 0 {
-            unknown += 0.5 * ORDERS_TOGETHER * variance * variance / *freedom as f64;
-        }
-    }
-    if noise <= 0.0 {
-        return None;
-    }
-    let middle = rms * rms - noise;
-    // Chance may leave less than a part of what noise alone has.
-    let reach = NORMAL_95 * ((spread - fourth).max(0.5 * fourth) + unknown).sqrt();
-    // It may also leave less than there is: then the interval begins at 0, and has its reach.
-    let interval_95 = [(middle - reach).max(0.0).sqrt(), (middle.max(0.0) + reach).sqrt()];
-    Some(Uncertainty { std: (interval_95[1] - interval_95[0]) / (2.0 * NORMAL_95), interval_95, draws: 0 })
-}
-
 /// How much wider intervals are whose draws come from so many transforms of several draws each, which give a standard deviation no better than
 /// two real degrees of freedom a transform do.
 fn widening(transforms: f64) -> f64 {
@@ -267,31 +169,6 @@ fn summed_up(draws: &mut [f64], value: f64) -> Uncertainty {
         interval_95: [(2.0 * value - point(draws, 1.0 - TAIL)).max(floor), 2.0 * value - point(draws, TAIL)],
         draws: draws.len(),
     }
-}
-
-/// Share of the standard deviation of noise to which it is known: it is taken from 20 complex degrees of freedom.
-const NOISE_KNOWN_TO: f64 = 0.11;
-/// The same in real degrees of freedom.
-const NOISE_FREEDOM: f64 = 40.0;
-
-/// What noise adds to an extreme in the mean, and the uncertainty of the extreme without that share, `value` − share: from
-/// the value at the profile that [stands for the truth](stand_in) and from those drawn about it. The interval reaches as far
-/// to both sides as the draws do to the farther one, and at least as far as Student's distribution says.
-#[must_use]
-pub fn extreme(value: f64, at_stand_in: f64, mut drawn: Vec<f64>) -> Option<(f64, Uncertainty)> {
-    if drawn.len() < 2 || !value.is_finite() || !at_stand_in.is_finite() || drawn.iter().any(|draw| !draw.is_finite()) {
-        return None;
-    }
-    let mean = drawn.iter().sum::<f64>() / drawn.len() as f64;
-    // Chance draws of no noise may lie below.
-    let share = (mean - at_stand_in).max(0.0);
-    let known = summed_up(&mut drawn, mean);
-    let reach = known.interval_95.map(|end| (end - mean).abs()).into_iter().fold(0.0, f64::max);
-    let reach = reach.max(student_95(NOISE_FREEDOM) * known.std).hypot(NORMAL_95 * NOISE_KNOWN_TO * share);
-    // No range is below 0, also where noise adds more to it in the mean than was found.
-    let middle = (value - share).max(0.0);
-    let interval_95 = [(middle - reach).max(0.0), middle + reach];
-    Some((share, Uncertainty { std: known.std.hypot(NOISE_KNOWN_TO * share), interval_95, ..known }))
 }
 
 /// A seed that depends on names only, so that it is the same however the work is shared.

@@ -36,7 +36,7 @@ fn bits(seed: u64, number: u64) -> u64 {
 
 /// Draws of normal numbers from one seed, a stretch of the table each.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Draws {
+struct Draws {
     seed: u64,
     /// Numbers that each draw has to itself.
     stride: usize,
@@ -45,13 +45,8 @@ pub(crate) struct Draws {
 }
 
 impl Draws {
-    /// From the seed of some noise, each draw of so many numbers.
-    pub(crate) fn new(noise: &Noise, stride: usize) -> Self {
-        Self { seed: noise.seed, stride, taken: 0 }
-    }
-
     /// The next so many numbers, in stretches of the table: from its end on they are those of its beginning.
-    pub(crate) fn next(&mut self, count: usize) -> impl Iterator<Item = &'static [Complex64]> + use<> {
+    fn next(&mut self, count: usize) -> impl Iterator<Item = &'static [Complex64]> + use<> {
         let first = bits(self.seed, 0) as usize % TABLE;
         let (mut from, mut left) = ((first + self.taken * self.stride) % TABLE, count);
         self.taken += 1;
@@ -82,12 +77,11 @@ impl Noise {
     pub fn new(orders: usize, seed: u64) -> Self {
         Self { seed, orders }
     }
+}
 
-    /// Numbers that have nothing in common with these but the table, and are these for 0.
-    #[must_use]
-    pub(crate) fn another(&self, number: u64) -> Self {
-        Self { seed: if number == 0 { self.seed } else { bits(self.seed, u64::MAX - number) }, ..*self }
-    }
+/// A seed whose numbers have nothing in common with those of this one but the table.
+pub(crate) fn another(seed: u64, number: u64) -> u64 {
+    bits(seed, u64::MAX - number)
 }
 
 /// A source of noise, the same for all profiles that have a part of it.
@@ -121,6 +115,11 @@ impl<'a> DrawnErrors<'a> {
     #[must_use]
     pub fn new(errors_um: &'a [f64]) -> Self {
         Self { drawn_um: errors_um, from: 0, largest_um: largest(errors_um) }
+    }
+
+    /// These in µm, of which the largest is known, turned so that the first angle has the error of the angle of this number.
+    pub(crate) fn turned(errors_um: &'a [f64], from: usize, largest_um: f64) -> Self {
+        Self { drawn_um: errors_um, from, largest_um }
     }
 
     /// The error at an angle by its number, in µm.
@@ -203,7 +202,7 @@ impl Errors {
     }
 
     /// Harmonics of the next errors, independent of all before, by order from 0.
-    fn harmonics(&mut self) -> Vec<Complex64> {
+    pub(crate) fn harmonics(&mut self) -> Vec<Complex64> {
         let orders = self.sources.iter().map(|source| source.amplitudes.len()).max().unwrap_or(0);
         let mut sum = vec![Complex64::ZERO; orders];
         for Source { draws, amplitudes } in &mut self.sources {
@@ -249,7 +248,7 @@ impl Errors {
 }
 
 /// The largest of some errors, without sign.
-fn largest(errors: &[f64]) -> f64 {
+pub(crate) fn largest(errors: &[f64]) -> f64 {
     const LANES: usize = 8;
     // Lanes that do not wait for each other.
     let mut largest = [0.0_f64; LANES];

@@ -1,0 +1,93 @@
+//! The interval of a value, by how far values of draws measured again miss those of the draws themselves.
+
+use crate::uncertainty::{NORMAL_95, Uncertainty};
+
+/// Share of the draws below and above: the two forms are not exact, so that less is left out than 2.5 %.
+const TAIL: f64 = 0.02;
+
+/// Values of the draws of one form, and by how much those measured again miss them.
+#[derive(Debug, Clone)]
+pub(crate) struct Sides {
+    missed: Vec<f64>,
+    lowest: f64,
+}
+
+impl Default for Sides {
+    fn default() -> Self {
+        Self { missed: Vec::new(), lowest: f64::INFINITY }
+    }
+}
+
+impl Sides {
+    pub(crate) fn add(&mut self, truth: f64, again: f64) {
+        self.missed.push(again - truth);
+        self.lowest = self.lowest.min(truth).min(again);
+    }
+
+    /// What is missed in the lowest, in half, and in the highest of all draws.
+    fn quantiles(&mut self) -> Option<[f64; 3]> {
+        if self.missed.is_empty() || self.missed.iter().any(|missed| !missed.is_finite()) {
+            return None;
+        }
+        self.missed.sort_by(f64::total_cmp);
+        let count = self.missed.len();
+        let at = |share: f64| {
+            let place = (share * (count as f64 + 1.0) - 1.0).clamp(0.0, (count - 1) as f64);
+            let below = place.floor() as usize;
+            let next = self.missed[(below + 1).min(count - 1)];
+            self.missed[below] + place.fract() * (next - self.missed[below])
+        };
+        Some([at(TAIL), at(0.5), at(1.0 - TAIL)])
+    }
+}
+
+/// What is known of one value.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Interval {
+    /// The value of what was found, on the angles of the draws.
+    pub found: f64,
+    /// What is known of its error; nothing where it is no number in every draw.
+    pub uncertainty: Option<Uncertainty>,
+    /// By how much noise raises it in the mean.
+    pub share_of_noise: f64,
+}
+
+impl Interval {
+    pub(crate) fn of(found: f64, processed: f64, sides: [Sides; 2]) -> Self {
+        let lowest = sides.iter().map(|sides| sides.lowest).fold(f64::INFINITY, f64::min);
+        let draws = sides.iter().map(|sides| sides.missed.len()).sum();
+        let mut missed = sides.map(|mut sides| sides.quantiles());
+        let (Some(least), Some(most)) = (missed[0].take(), missed[1].take()) else {
+            return Self { found, uncertainty: None, share_of_noise: f64::NAN };
+        };
+        if !(found.is_finite() && processed.is_finite()) {
+            return Self { found, uncertainty: None, share_of_noise: f64::NAN };
+        }
+        let floor = if lowest >= 0.0 { 0.0 } else { f64::NEG_INFINITY };
+        let interval_95 =
+            [processed - least[2].max(most[2]), processed - least[0].min(most[0])].map(|end| end.max(floor));
+        let std = (interval_95[1] - interval_95[0]) / (2.0 * NORMAL_95);
+        let share_of_noise = found - processed + 0.5 * (least[1] + most[1]);
+        Self { found, uncertainty: Some(Uncertainty { std, interval_95, draws }), share_of_noise }
+    }
+
+    /// By how much noise has raised it, where that is more than its standard uncertainty.
+    #[must_use]
+    pub fn raised_by_noise(&self) -> Option<f64> {
+        let std = self.uncertainty.as_ref()?.std;
+        (self.share_of_noise > std).then_some(self.share_of_noise)
+    }
+
+    /// What is known of the same value found as `value`, on more angles.
+    #[must_use]
+    pub fn at(&self, value: f64) -> Option<Uncertainty> {
+        self.uncertainty.clone().map(|known| {
+            let may_be_nothing = known.interval_95[0] == 0.0;
+            let mut known = known.moved(value - self.found);
+            if may_be_nothing {
+                known.interval_95[0] = 0.0;
+            }
+            known
+        })
+    }
+}

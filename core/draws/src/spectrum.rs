@@ -1,0 +1,202 @@
+//! How much of each order is form: power of waves beside it, with its limits.
+
+use std::ops::Range;
+
+use runout_numerics::Complex64;
+
+/// Orders beside an order from which the power of waves is taken, to each side: a third of it, this at least.
+const FEWEST_BESIDE: usize = 4;
+/// A line is an order of more power than waves and noise have together, by a chance of e⁻⁹.
+pub(crate) const LINE: f64 = 9.0;
+/// Looks at which orders are lines: those found at the first are left out at the second.
+const LOOKS: usize = 2;
+/// Squares that a variance is taken to be known from at least where its chance is weighed: a mean of x⁻¹ of fewer hardly exists.
+const FEWEST_SQUARES: f64 = 8.0;
+/// Orders that share a variance: the squares of one are worth those of so many fewer.
+const SHARING: f64 = 5.0;
+/// No ratio of power to variance stands out less than by chance beyond this, however few squares the variance is known from.
+const LARGEST_RATIO: f64 = 400.0;
+
+/// Normal quantile at which the limits of the power of waves are taken.
+const LIMIT: f64 = 2.0;
+
+/// How sure a spectrum is to be read.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Power {
+    /// The lower limit; none where noise alone may have as much, beyond this quantile.
+    Least { seen: f64 },
+    /// What was found.
+    Middle,
+    /// The upper limit.
+    Most,
+}
+
+/// Ratio of an order's power to its variance that noise exceeds once in eˣ cases, the variance known from so many squares (0: exactly).
+pub(crate) fn above(x: f64, squares: usize) -> f64 {
+    if squares == 0 { x } else { (0.5 * squares as f64 * (2.0 * x / squares as f64).exp_m1()).min(LARGEST_RATIO) }
+}
+
+/// Quantile of a mean of so many squares of 1 in the mean (Wilson, Hilferty, Proc. Natl. Acad. Sci. 17 (1931) 684).
+fn of_mean_square(squares: f64, normal: f64) -> f64 {
+    let ninth = 1.0 / (9.0 * squares.max(1.0));
+    (1.0 - ninth + normal * ninth.sqrt()).max(0.05).powi(3)
+}
+
+/// Sums over the orders up to each, of which a window's sum is a difference.
+struct Sums(Vec<f64>);
+
+impl Sums {
+    fn of(values: impl Iterator<Item = f64>) -> Self {
+        let mut sum = 0.0;
+        let after = values.map(|value| {
+            sum += value;
+            sum
+        });
+        Self(std::iter::once(0.0).chain(after).collect())
+    }
+
+    fn over(&self, orders: &Range<usize>) -> f64 {
+        self.0[orders.end] - self.0[orders.start]
+    }
+}
+
+/// What the noise of each order is known to be, by order from 0.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Noise<'a> {
+    /// E|e|²; an order without a positive one is taken as exact.
+    pub variance: &'a [f64],
+    /// Squares that it is known from; 0: exactly.
+    pub squares: &'a [usize],
+    /// Orders below are exact.
+    pub lowest: usize,
+}
+
+impl Noise<'_> {
+    /// Variance of an order of which it is known.
+    pub(crate) fn of(&self, order: usize) -> Option<f64> {
+        self.variance
+            .get(order)
+            .copied()
+            .filter(|variance| order >= self.lowest && *variance > 0.0 && variance.is_finite())
+    }
+
+    pub(crate) fn squares(&self, order: usize) -> usize {
+        self.squares.get(order).copied().unwrap_or(0)
+    }
+
+    /// By how much the mean of 1/x of a mean of squares x exceeds 1: orders of which the variance was found too small weigh more.
+    fn few(&self, order: usize) -> f64 {
+        let squares = (self.squares(order) as f64).max(FEWEST_SQUARES);
+        if self.squares(order) == 0 { 1.0 } else { squares / (squares - 4.0) }
+    }
+
+    /// By how much the variance of a sum over orders that share a variance exceeds that of independent ones.
+    fn shared(&self, order: usize) -> f64 {
+        if self.squares(order) == 0 { 1.0 } else { 1.0 + 2.0 * SHARING / self.squares(order) as f64 }
+    }
+}
+
+/// The spectrum of one profile.
+pub(crate) struct Spectrum<'a> {
+    pub power: Vec<f64>,
+    noise: Noise<'a>,
+    /// Mean power of an order and of its neighbours, of which lines are left out, and what noise has of it.
+    total: Vec<f64>,
+    of_noise: Vec<f64>,
+    /// Squares that the total is worth, where there are no waves and where there are.
+    without_waves: Vec<f64>,
+    with_waves: Vec<f64>,
+}
+
+impl<'a> Spectrum<'a> {
+    pub(crate) fn of(harmonics: &[Complex64], noise: Noise<'a>) -> Self {
+        let count = harmonics.len();
+        let power: Vec<f64> = harmonics.iter().map(Complex64::norm_sqr).collect();
+        let window = |order: usize| {
+            let beside = (order / 3).max(FEWEST_BESIDE);
+            order.saturating_sub(beside).max(noise.lowest).min(count)..(order + beside + 1).min(count)
+        };
+        let variance = |order: usize| noise.of(order).unwrap_or(0.0);
+        let (mut waves, mut lines) = (vec![0.0; count], vec![false; count]);
+        let weights = |waves: &[f64], lines: &[bool]| -> Vec<f64> {
+            let weight =
+                |order: usize| noise.of(order).filter(|_| !lines[order]).map_or(0.0, |of| (waves[order] + of).powi(-2));
+            (0..count).map(weight).collect()
+        };
+        let excess = |order: usize| power[order] - variance(order) * noise.few(order);
+        for _ in 0..LOOKS {
+            let weights = weights(&waves, &lines);
+            let all = Sums::of(weights.iter().copied());
+            let above_noise = Sums::of((0..count).map(|order| weights[order] * excess(order)));
+            waves = (0..count)
+                .map(|order| {
+                    let (orders, own) = (window(order), weights[order]);
+                    let others = all.over(&orders) - own;
+                    let found = above_noise.over(&orders) - own * excess(order);
+                    if others > 1e-12 * (others + own) { (found / others).max(0.0) } else { 0.0 }
+                })
+                .collect();
+            for (order, line) in lines.iter_mut().enumerate() {
+                let is_above = |of: f64| power[order] > above(LINE, noise.squares(order)) * (waves[order] + of);
+                *line = noise.of(order).is_some_and(is_above);
+            }
+        }
+        let weights = weights(&waves, &lines);
+        let sums = |of: &dyn Fn(usize) -> f64| -> Vec<f64> {
+            let sums = Sums::of((0..count).map(of));
+            (0..count).map(|order| sums.over(&window(order)).max(0.0)).collect()
+        };
+        let all = sums(&|order| weights[order]);
+        let mean = |order: usize, sum: f64| if all[order] > 0.0 { sum / all[order] } else { 0.0 };
+        let means = |of: &dyn Fn(usize) -> f64| -> Vec<f64> {
+            sums(of).into_iter().enumerate().map(|(order, sum)| mean(order, sum)).collect()
+        };
+        let total = means(&|order| weights[order] * power[order]);
+        let of_noise = means(&|order| weights[order] * variance(order) * noise.few(order));
+        let raw = |order: usize| (total[order] - of_noise[order]).max(0.0);
+        // Squares that a weighted mean is worth: its square over half of its variance.
+        let worth = |level: &dyn Fn(usize) -> f64, each: &dyn Fn(usize) -> f64| -> Vec<f64> {
+            let spread = sums(&|order| (weights[order] * each(order)).powi(2) * noise.shared(order));
+            let spread = spread.into_iter().enumerate();
+            spread.map(|(order, sum)| (level(order) * all[order]).powi(2) / sum.max(f64::MIN_POSITIVE)).collect()
+        };
+        let without_waves = worth(&|order| of_noise[order], &variance);
+        let with_waves = worth(&|order| raw(order) + of_noise[order], &|order| raw(order) + variance(order));
+        Self { power, noise, total, of_noise, without_waves, with_waves }
+    }
+
+    /// Power of the waves at an order.
+    pub(crate) fn waves(&self, order: usize, power: Power) -> f64 {
+        let (total, of_noise) = (self.total[order], self.of_noise[order]);
+        let (quantile, is_seen) = match power {
+            Power::Least { seen } => (LIMIT, total > of_noise * of_mean_square(self.without_waves[order], seen)),
+            Power::Middle => (0.0, true),
+            Power::Most => (-LIMIT, true),
+        };
+        let level = if power == Power::Middle { 1.0 } else { of_mean_square(self.with_waves[order], quantile) };
+        if is_seen { (total / level - of_noise).max(0.0) } else { 0.0 }
+    }
+
+    /// Share of each order that is form: by the power of waves, or by its own where that is above noise by a chance of e^−`shown`. All of
+    /// an order without noise.
+    pub(crate) fn shares(&self, power: Power, shown: f64) -> Vec<f64> {
+        let share = |order: usize| {
+            let Some(variance) = self.noise.of(order) else { return 1.0 };
+            let (waves, own) = (self.waves(order, power), self.power[order]);
+            let is_shown = own > above(shown, self.noise.squares(order)) * variance;
+            (waves / (waves + variance)).max(if is_shown { 1.0 - variance / own } else { 0.0 })
+        };
+        (0..self.power.len()).map(share).collect()
+    }
+
+    /// Variance of each order as what is no mark sees it: noise and waves, or all of a line.
+    pub(crate) fn background(&self) -> Vec<Option<f64>> {
+        let of = |order: usize| {
+            let variance = self.noise.of(order)?;
+            let both = self.waves(order, Power::Middle) + variance;
+            let is_line = self.power[order] > above(LINE, self.noise.squares(order)) * both;
+            Some(if is_line { both.max(self.power[order]) } else { both })
+        };
+        (0..self.power.len()).map(of).collect()
+    }
+}
