@@ -64,21 +64,6 @@ impl Draws {
     }
 }
 
-/// Normal numbers of one seed that several [`Errors`] share: those of one form behind different filters.
-#[derive(Debug, Clone, Copy)]
-pub struct Noise {
-    seed: u64,
-    orders: usize,
-}
-
-impl Noise {
-    /// For so many orders, from a seed.
-    #[must_use]
-    pub fn new(orders: usize, seed: u64) -> Self {
-        Self { seed, orders }
-    }
-}
-
 /// A seed whose numbers have nothing in common with those of this one but the table.
 pub(crate) fn another(seed: u64, number: u64) -> u64 {
     bits(seed, u64::MAX - number)
@@ -154,32 +139,20 @@ impl Errors {
     /// `lowest`, are taken as exact. `None` where no variance is known.
     #[must_use]
     pub fn new(variance: &[f64], lowest: usize, seed: u64) -> Option<Self> {
-        Self::sharing(variance, lowest, &Noise::new(variance.len(), seed))
-    }
-
-    /// The same from numbers that others take too: draw by draw, errors of both differ by their variance only.
-    #[must_use]
-    pub fn sharing(variance: &[f64], lowest: usize, noise: &Noise) -> Option<Self> {
-        let amplitudes = variance.iter().map(|variance| Complex64::from(variance.sqrt())).collect();
-        Self::of_numbers([(*noise, amplitudes)], lowest)
+        Self::of_sources([(seed, variance.iter().map(|variance| Complex64::from(variance.sqrt())).collect())], lowest)
     }
 
     /// From independent sources of noise, each with its seed and what its noise of E|g|² = 1 makes of each order: profiles that
     /// have a source in common have its noise in common. All draws are turned as the first source says.
     #[must_use]
     pub fn of_sources(sources: impl IntoIterator<Item = (u64, Vec<Complex64>)>, lowest: usize) -> Option<Self> {
-        let noise = |(seed, amplitudes): (u64, Vec<Complex64>)| (Noise::new(amplitudes.len(), seed), amplitudes);
-        Self::of_numbers(sources.into_iter().map(noise), lowest)
-    }
-
-    fn of_numbers(sources: impl IntoIterator<Item = (Noise, Vec<Complex64>)>, lowest: usize) -> Option<Self> {
         // A coefficient's real and imaginary part have half of its variance each; a level is real.
         let share = |order: usize| if order == 0 { 1.0 } else { 0.5_f64.sqrt() };
         let amplitude = |(order, amplitude): (usize, Complex64)| {
             if order >= lowest && amplitude.is_finite() { share(order) * amplitude } else { Complex64::ZERO }
         };
-        let source = |(noise, amplitudes): (Noise, Vec<Complex64>)| Source {
-            draws: Draws { seed: noise.seed, stride: noise.orders, taken: 0 },
+        let source = |(seed, amplitudes): (u64, Vec<Complex64>)| Source {
+            draws: Draws { seed, stride: amplitudes.len(), taken: 0 },
             amplitudes: amplitudes.into_iter().enumerate().map(amplitude).collect(),
         };
         let sources: Vec<Source> = sources.into_iter().map(source).collect();
@@ -308,11 +281,10 @@ mod tests {
     #[allow(clippy::float_cmp, reason = "the same operations")]
     fn errors_share_their_numbers() {
         let variance = [0.01; 30];
-        let noise = Noise::new(30, 5);
         let mut fourier = Fourier::new(64);
         let mut own = Errors::new(&variance, 2, 5).unwrap();
-        let mut shared = Errors::sharing(&variance, 2, &noise).unwrap();
-        let mut doubled = Errors::sharing(&variance.map(|variance| 4.0 * variance), 2, &noise).unwrap();
+        let mut shared = Errors::new(&variance, 2, 5).unwrap();
+        let mut doubled = Errors::new(&variance.map(|variance| 4.0 * variance), 2, 5).unwrap();
         for draw in 0..40 {
             let expected: Vec<f64> = own.turned(&mut fourier).iter().copied().collect();
             let found = shared.turned(&mut fourier);
@@ -321,7 +293,7 @@ mod tests {
             let twice = doubled.turned(&mut fourier);
             assert!((0..64).all(|angle| (twice.at(angle) - 2.0 * expected[angle]).abs() < 1e-14), "{draw}");
         }
-        let more = Errors::sharing(&[0.01; 31], 2, &noise).unwrap();
+        let more = Errors::new(&[0.01; 31], 2, 5).unwrap();
         assert_eq!(more.sources[0].amplitudes.len(), 31);
     }
 

@@ -19,8 +19,8 @@ mod spectrum;
 mod uncertainty;
 
 pub use angles::{angles_for_parabolas, crest_order, drawn_angles};
-pub use errors::{DrawnErrors, Errors, Noise, TURNS_OF_A_DRAW};
+pub use errors::{DrawnErrors, Errors, TURNS_OF_A_DRAW};
 pub use interval::Interval;
 pub use profiles::{Draws, KINDS, Profiles, Source};
-pub use section::{Measured, Section};
+pub use section::Measured;
 pub use uncertainty::*;

@@ -50,7 +50,7 @@ pub(crate) struct Form {
 
 /// A section read twice.
 #[derive(Debug, Clone)]
-pub struct Section {
+pub(crate) struct Section {
     /// The harmonics found.
     pub(crate) found: Vec<Complex64>,
     pub(crate) marks: Marks,
