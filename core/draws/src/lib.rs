@@ -7,7 +7,7 @@
 //! processed and evaluated as the measured one was. By as much as a value misses the truth there, it may miss it here: the interval is the
 //! value less the 2 to 98 % range of these differences, from the lower end for one form to the upper end for the other.
 //!
-//! No value and no standard is known here: a value is a function of a draw ([`Draws::values`]).
+//! No value and no standard is known here: a value is a function of a draw ([`Profiles::values`]).
 
 mod angles;
 mod errors;
