@@ -1,4 +1,4 @@
-//! Synchronous values of a plot about a centre: peak to valley and root mean square, without what noise adds to them.
+//! Synchronous values of a plot about a centre: peak to valley and root mean square, with intervals without what noise adds to them.
 
 use super::{
     Centre, FINER,
