@@ -10,7 +10,7 @@ use runout_numerics::{Complex64, fourier::Fourier};
 use crate::{
     errors::{DrawnErrors, Errors, largest},
     interval::{Interval, Sides},
-    section::{Measured, Section, known_together},
+    section::{Form, Measured, Section, known_together},
 };
 
 /// Transforms of each form, of [`TURNS`] draws each: with 100 draws the ends of an interval are the second from each end.
@@ -236,7 +236,7 @@ impl Profiles<'_> {
         for transform in 0..draws.transforms {
             let wider = draws.wider(&mut random);
             let drawn: Vec<Drawn> = (sections.iter().zip(&mut sources))
-                .map(|(section, errors)| self.noise(section, &section.forms[form].spread, errors, &wider, &mut fourier))
+                .map(|(section, errors)| self.noise(section, &section.forms[form], errors, &wider, &mut fourier))
                 .collect();
             for turn in 0..TURNS {
                 // Other angles in each transform, so that no place is always the same.
@@ -286,7 +286,7 @@ impl Profiles<'_> {
     fn noise(
         &self,
         section: &Section,
-        spread: &[f64],
+        form: &Form,
         [of_form, of_measurement]: &mut [Errors; 2],
         wider: &[f64],
         fourier: &mut Fourier,
@@ -297,10 +297,11 @@ impl Profiles<'_> {
             again.truncate(self.weights.len());
         }
         let mut truth = Vec::with_capacity(again.len());
-        let both = again.iter_mut().zip(of_form).zip(spread.iter().zip(wider));
-        for ((again, of_form), (spread, wider)) in both {
-            let of_truth = of_form * (spread * wider);
-            *again = of_truth + *again * *wider;
+        let both = again.iter_mut().zip(of_form).zip(form.spread.iter().zip(&form.noise).zip(wider));
+        for ((again, of_form), ((spread, noise), wider)) in both {
+            let noise = noise * wider;
+            let of_truth = of_form * (spread * noise);
+            *again = of_truth + *again * noise;
             truth.push(of_truth);
         }
         let with_largest = |noise_um: &[f64]| (noise_um.to_vec(), largest(noise_um));

@@ -177,6 +177,15 @@ impl<'a> Spectrum<'a> {
         if is_seen { (total / level - of_noise).max(0.0) } else { 0.0 }
     }
 
+    /// Share of each variance that noise has at most: below 1 where noise alone would have more power beyond this quantile.
+    pub(crate) fn allowed(&self, quantile: f64) -> Vec<f64> {
+        let share = |order: usize| {
+            let fewest = self.of_noise[order] * of_mean_square(self.without_waves[order], -quantile);
+            if self.total[order] < fewest { self.total[order] / fewest } else { 1.0 }
+        };
+        (0..self.power.len()).map(share).collect()
+    }
+
     /// Share of each order that is form: by the power of waves, or by its own where that is above noise by a chance of e^−`shown`. All of
     /// an order without noise.
     pub(crate) fn shares(&self, power: Power, shown: f64) -> Vec<f64> {
