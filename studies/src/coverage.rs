@@ -3,7 +3,8 @@
 use std::fmt::Write;
 
 use runout_core::{
-    Complex64, Error, Result, draws,
+    Complex64, Error, Result,
+    draws::{Draws, Measured, Uncertainty},
     measurement::StationTruth,
     numerics::fourier::Fourier,
     separation::{Quantity, Separation},
@@ -194,16 +195,19 @@ fn sizes(separation: &Separation, unknown: usize, truth_um: &[f64], rows: &mut V
     let width = separation.unknowns.len();
     let from_two = |(order, value)| if order < 2 { Complex64::ZERO } else { value };
     let harmonics = separation.coefficients(unknown).enumerate().map(from_two);
-    let form_um = Fourier::new(truth_um.len()).synthesise(harmonics).to_vec();
+    let harmonics: Vec<Complex64> = harmonics.collect();
     let variance: Vec<f64> = separation.variance.iter().skip(unknown).step_by(width).copied().collect();
-    let values = |profile: &[f64]| [ront_lsci_um(profile), ra_um(profile)];
+    let squares = (0..variance.len()).map(|order| separation.degrees_of_freedom(order)).collect();
     // Any seed that is another one for another form.
-    let seed = form_um.first().map_or(0, |value| value.to_bits());
-    let Some(found) = draws::monte_carlo(&form_um, &variance, seed, values) else { return };
-    for (index, name) in ["RONt", "Ra"].into_iter().enumerate() {
-        let (truth, value) = (values(truth_um)[index], values(&form_um)[index]);
-        let [low, high] = found[index].interval_95;
-        entry(rows, name.into()).add_interval(value - truth, found[index].std, (low..=high).contains(&truth));
+    let seed = harmonics.last().map_or(0, |value| value.re.to_bits());
+    let Some(draws) = Draws::of_section(&Measured { harmonics, variance, squares, lowest: 2 }, seed) else { return };
+    let values = |profile: &[f64], found: &mut Vec<f64>| found.extend([ront_lsci_um(profile), ra_um(profile)]);
+    let mut truths = Vec::new();
+    values(truth_um, &mut truths);
+    let found = draws.profiles(|_| Complex64::ONE, truth_um.len(), |_, _| ()).values_of_section(values);
+    for ((name, truth), known) in ["RONt", "Ra"].into_iter().zip(truths).zip(found) {
+        let Some(Uncertainty { std, interval_95: [low, high], .. }) = known.uncertainty else { continue };
+        entry(rows, name.into()).add_interval(known.found - truth, std, (low..=high).contains(&truth));
     }
 }
 

@@ -14,9 +14,6 @@ use rand_distr::{Distribution, StandardNormal};
 
 use runout_numerics::{Complex64, fourier::Fourier};
 
-/// Draws from one transform, turned by equal steps from a random start.
-pub const TURNS_OF_A_DRAW: usize = 25;
-
 /// Complex normal numbers of the table: more than the draws of one form take.
 const TABLE: usize = 1 << 17;
 
@@ -56,12 +53,6 @@ impl Draws {
             (!stretch.is_empty()).then_some(stretch)
         })
     }
-
-    /// Where the draw that was taken last starts in a turn of so many angles.
-    fn start(&self, angles: usize) -> usize {
-        let share = (bits(self.seed, self.taken as u64) >> 11) as f64 / (1_u64 << 53) as f64;
-        ((share * angles as f64) as usize).min(angles.saturating_sub(1))
-    }
 }
 
 /// A seed whose numbers have nothing in common with those of this one but the table.
@@ -79,11 +70,6 @@ struct Source {
 /// Draws of the errors of a profile on equal angles.
 pub struct Errors {
     sources: Vec<Source>,
-    /// The errors last drawn, before they are turned.
-    drawn_um: Vec<f64>,
-    largest_um: f64,
-    start: usize,
-    turn: usize,
 }
 
 /// One draw of errors on equal angles.
@@ -127,6 +113,15 @@ impl<'a> DrawnErrors<'a> {
         first.iter().chain(others)
     }
 
+    /// Fills `sum` with heights in µm to which these are added.
+    pub fn added_to(&self, heights_um: &[f64], sum: &mut Vec<f64>) {
+        sum.clear();
+        for errors in self.parts() {
+            let heights = &heights_um[sum.len()..];
+            sum.extend(heights.iter().zip(errors).map(|(height, error)| height + error));
+        }
+    }
+
     /// The largest of them in µm, without sign.
     #[must_use]
     pub fn largest_um(&self) -> f64 {
@@ -143,7 +138,7 @@ impl Errors {
     }
 
     /// From independent sources of noise, each with its seed and what its noise of E|g|² = 1 makes of each order: profiles that
-    /// have a source in common have its noise in common. All draws are turned as the first source says.
+    /// have a source in common have its noise in common.
     #[must_use]
     pub fn of_sources(sources: impl IntoIterator<Item = (u64, Vec<Complex64>)>, lowest: usize) -> Option<Self> {
         // A coefficient's real and imaginary part have half of its variance each; a level is real.
@@ -157,8 +152,7 @@ impl Errors {
         };
         let sources: Vec<Source> = sources.into_iter().map(source).collect();
         let some = sources.iter().flat_map(|source| &source.amplitudes).any(|amplitude| *amplitude != Complex64::ZERO);
-        let (drawn_um, start, turn) = (Vec::new(), 0, 0);
-        some.then_some(Self { sources, drawn_um, largest_um: 0.0, start, turn })
+        some.then_some(Self { sources })
     }
 
     /// The standard deviation of an error at any one angle.
@@ -168,55 +162,27 @@ impl Errors {
         amplitudes.map(Complex64::norm_sqr).sum::<f64>().sqrt()
     }
 
-    /// The largest error of the last draw.
-    #[must_use]
-    pub fn largest_um(&self) -> f64 {
-        self.largest_um
-    }
-
-    /// Harmonics of the next errors, independent of all before, by order from 0.
-    pub(crate) fn harmonics(&mut self) -> Vec<Complex64> {
+    /// Fills `harmonics` with those of the next errors, independent of all before, by order from 0.
+    pub(crate) fn harmonics(&mut self, harmonics: &mut Vec<Complex64>) {
         let orders = self.sources.iter().map(|source| source.amplitudes.len()).max().unwrap_or(0);
-        let mut sum = vec![Complex64::ZERO; orders];
+        harmonics.clear();
+        harmonics.resize(orders, Complex64::ZERO);
         for Source { draws, amplitudes } in &mut self.sources {
             let mut done = 0;
             for stretch in draws.next(amplitudes.len()) {
                 let all = done..done + stretch.len();
-                let places = sum[all.clone()].iter_mut().zip(&amplitudes[all]);
+                let places = harmonics[all.clone()].iter_mut().zip(&amplitudes[all]);
                 places.zip(stretch).for_each(|((sum, amplitude), number)| *sum += amplitude * number);
                 done += stretch.len();
             }
         }
-        sum
     }
 
     /// Fills `errors_um` with the next errors on the equal angles that `fourier` has, independent of all before.
     pub fn fresh(&mut self, fourier: &mut Fourier, errors_um: &mut [f64]) {
-        let harmonics = self.harmonics();
+        let mut harmonics = Vec::new();
+        self.harmonics(&mut harmonics);
         errors_um.copy_from_slice(&fourier.synthesise(harmonics)[..errors_um.len()]);
-    }
-
-    /// The next errors; all draws are of the one length that `fourier` has.
-    pub fn turned(&mut self, fourier: &mut Fourier) -> DrawnErrors<'_> {
-        let length = fourier.length();
-        if self.turn == 0 {
-            let harmonics = self.harmonics();
-            self.drawn_um.clear();
-            self.drawn_um.extend_from_slice(fourier.synthesise(harmonics));
-            // As the first source says.
-            self.start = self.sources.first().map_or(0, |source| source.draws.start(length));
-            self.largest_um = largest(&self.drawn_um);
-        }
-        let from = (self.start + self.turn * length / TURNS_OF_A_DRAW) % length;
-        self.turn = (self.turn + 1) % TURNS_OF_A_DRAW;
-        DrawnErrors { drawn_um: &self.drawn_um, from, largest_um: self.largest_um }
-    }
-
-    /// Fills `drawn` with `form_um` and the next errors; all draws are of the one length that `fourier` has.
-    pub fn draw(&mut self, fourier: &mut Fourier, form_um: &[f64], drawn: &mut Vec<f64>) {
-        let errors = self.turned(fourier);
-        drawn.clear();
-        drawn.extend(form_um.iter().zip(errors.iter()).map(|(form, error)| form + error));
     }
 }
 
@@ -243,58 +209,33 @@ mod tests {
     /// Two profiles of one station: the second has 0.6i of the first one's noise, and 0.8 of its own.
     #[test]
     fn profiles_share_the_noise_of_their_sources() {
-        let (orders, length, order) = (12, 64, 5);
+        let (orders, order) = (12, 5);
         let of = |share: Complex64| vec![share; orders];
         let own = (1, of(Complex64::ONE));
         let mut first = Errors::of_sources([own.clone()], 2).unwrap();
         let mut second =
             Errors::of_sources([(1, of(Complex64::new(0.0, 0.6))), (2, of(Complex64::from(0.8)))], 2).unwrap();
         assert!((first.std_um() - second.std_um()).abs() < 1e-12);
-        let (mut fourier, level) = (Fourier::new(length), vec![0.0; length]);
         let (mut squares, mut product) = ([0.0; 2], Complex64::ZERO);
-        for _ in 0..TURNS_OF_A_DRAW * 2000 {
-            let mut drawn = [Vec::new(), Vec::new()];
-            first.draw(&mut fourier, &level, &mut drawn[0]);
-            second.draw(&mut fourier, &level, &mut drawn[1]);
-            let [a, b] = drawn.map(|profile| {
-                let mut harmonics = vec![Complex64::ZERO; length / 2];
-                Fourier::new(length).analyse(profile, &mut harmonics);
-                harmonics[order]
-            });
+        let mut harmonics = [Vec::new(), Vec::new()];
+        for _ in 0..2000 {
+            let [of_first, of_second] = &mut harmonics;
+            first.harmonics(of_first);
+            second.harmonics(of_second);
+            let (a, b) = (of_first[order], of_second[order]);
             squares = [squares[0] + a.norm_sqr(), squares[1] + b.norm_sqr()];
             product += b * a.conj();
         }
         let product = product / (squares[0] * squares[1]).sqrt();
         // 2000 independent draws.
         assert!((squares[0] / squares[1] - 1.0).abs() < 0.1 && (product - Complex64::new(0.0, 0.6)).norm() < 0.06);
-        // The first source alone draws what it drew before there were several.
+        // A source alone draws the same.
         let mut alone = Errors::new(&vec![1.0; orders], 2, 1).unwrap();
         let mut again = Errors::of_sources([own], 2).unwrap();
-        let mut drawn = [Vec::new(), Vec::new()];
-        alone.draw(&mut fourier, &level, &mut drawn[0]);
-        again.draw(&mut fourier, &level, &mut drawn[1]);
-        assert_eq!(drawn[0], drawn[1]);
-    }
-
-    /// Shared numbers are those of the seed, for all that share them.
-    #[test]
-    #[allow(clippy::float_cmp, reason = "the same operations")]
-    fn errors_share_their_numbers() {
-        let variance = [0.01; 30];
-        let mut fourier = Fourier::new(64);
-        let mut own = Errors::new(&variance, 2, 5).unwrap();
-        let mut shared = Errors::new(&variance, 2, 5).unwrap();
-        let mut doubled = Errors::new(&variance.map(|variance| 4.0 * variance), 2, 5).unwrap();
-        for draw in 0..40 {
-            let expected: Vec<f64> = own.turned(&mut fourier).iter().copied().collect();
-            let found = shared.turned(&mut fourier);
-            assert!(found.iter().eq(&expected), "{draw}");
-            assert!((0..64).all(|angle| found.at(angle) == expected[angle]), "{draw}");
-            let twice = doubled.turned(&mut fourier);
-            assert!((0..64).all(|angle| (twice.at(angle) - 2.0 * expected[angle]).abs() < 1e-14), "{draw}");
-        }
-        let more = Errors::new(&[0.01; 31], 2, 5).unwrap();
-        assert_eq!(more.sources[0].amplitudes.len(), 31);
+        let [one, other] = &mut harmonics;
+        alone.harmonics(one);
+        again.harmonics(other);
+        assert_eq!(one, other);
     }
 
     /// Draws of one seed, and of others, are as independent as numbers of their own would be.
@@ -315,14 +256,5 @@ mod tests {
         }
         // Of 4950 pairs, each 1/√1000 in the root mean square.
         assert!(largest < 0.13, "{largest}");
-        let starts: Vec<usize> = (0..1000)
-            .map(|seed| {
-                let mut draws = Draws { seed, stride: 10, taken: 0 };
-                let _ = draws.next(10);
-                draws.start(360)
-            })
-            .collect();
-        let mean = starts.iter().sum::<usize>() as f64 / 1000.0;
-        assert!((mean - 179.5).abs() < 12.0 && starts.iter().all(|start| *start < 360), "{mean}");
     }
 }

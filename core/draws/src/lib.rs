@@ -19,7 +19,7 @@ mod spectrum;
 mod uncertainty;
 
 pub use angles::{angles_for_parabolas, crest_order, drawn_angles};
-pub use errors::{DrawnErrors, Errors, TURNS_OF_A_DRAW};
+pub use errors::{DrawnErrors, Errors};
 pub use interval::Interval;
 pub use profiles::{Draws, KINDS, Profiles, Source};
 pub use section::Measured;

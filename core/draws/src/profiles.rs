@@ -37,11 +37,12 @@ pub struct Draws {
     sections: Vec<Section>,
     /// Of each section, sources that it may share with others.
     sources: Vec<Vec<Source>>,
-    /// Orders whose variances are known together, each with what its chance is of.
-    together: Vec<(Range<usize>, f64, ChiSquared<f64>)>,
+    /// Orders whose variances are known together.
+    together: Vec<Range<usize>>,
+    /// By form and transform, the factor on the noise of each of them.
+    wider: [Vec<Vec<f64>>; 2],
     lowest: usize,
     transforms: usize,
-    seed: u64,
 }
 
 /// Profiles on equal angles, of which values are computed.
@@ -74,20 +75,22 @@ impl Draws {
         }
         let sections = measured.iter().map(|section| Section::of(section, measured.len() > 1)).collect();
         let longest = measured.iter().map(|section| &section.squares).max_by_key(|squares| squares.len());
-        Some(Self {
-            sections,
-            sources,
-            together: known_together(longest.map_or(&[][..], Vec::as_slice))
-                .into_iter()
-                .filter_map(|(orders, squares)| {
-                    let squares = squares as f64;
-                    Some((orders, squares, ChiSquared::new(squares).ok()?))
-                })
-                .collect(),
-            lowest,
-            transforms: TRANSFORMS,
-            seed,
-        })
+        let together = known_together(longest.map_or(&[][..], Vec::as_slice));
+        let chances: Vec<Option<ChiSquared<f64>>> =
+            together.iter().map(|(_, squares)| ChiSquared::new(*squares as f64).ok()).collect();
+        let wider = [0, 1].map(|form| {
+            let mut random = ChaCha8Rng::seed_from_u64(seed.wrapping_add(form));
+            let mut of_all = || {
+                together
+                    .iter()
+                    .zip(&chances)
+                    .map(|((_, squares), of)| wider(*squares, of.as_ref(), &mut random))
+                    .collect()
+            };
+            (0..TRANSFORMS).map(|_| of_all()).collect()
+        });
+        let together = together.into_iter().map(|(orders, _)| orders).collect();
+        Some(Self { sections, sources, together, wider, lowest, transforms: TRANSFORMS })
     }
 
     /// The same of so many draws in all, or less where there are less.
@@ -137,19 +140,25 @@ impl Draws {
         Some([of(0)?, of(1)?])
     }
 
-    /// Factor on the noise of each order, as wide as its variance is badly known: one chance for all orders and sections that share it.
-    fn wider(&self, random: &mut ChaCha8Rng) -> Vec<f64> {
+    /// Factor on the noise of each order in a draw.
+    fn wider(&self, form: usize, transform: usize) -> Vec<f64> {
         let orders = self.sections.iter().map(|section| section.found.len()).max().unwrap_or(0);
         let mut factors = vec![1.0; orders];
-        for (orders, squares, chance) in &self.together {
-            // Weights by 1/variance² favour orders whose variance was found too small by as much again.
-            let few = squares.max(FEWEST_SQUARES);
-            let excess = (few - 2.0) / (few - 4.0);
+        for (orders, factor) in self.together.iter().zip(&self.wider[form][transform]) {
             let end = orders.end.min(factors.len());
-            factors[orders.start.min(end)..end].fill((squares / chance.sample(random)).sqrt() * excess);
+            factors[orders.start.min(end)..end].fill(*factor);
         }
         factors
     }
+}
+
+/// A factor on noise, as wide as its variance is badly known from so many squares: one chance for all orders and sections that share it.
+fn wider(squares: usize, chance: Option<&ChiSquared<f64>>, random: &mut ChaCha8Rng) -> f64 {
+    let Some(chance) = chance else { return 1.0 };
+    let squares = squares as f64;
+    // Weights by 1/variance² favour orders whose variance was found too small by as much again.
+    let few = squares.max(FEWEST_SQUARES);
+    (squares / chance.sample(random)).sqrt() * (few - 2.0) / (few - 4.0)
 }
 
 /// A profile of weighted orders on the angles of a transform.
@@ -159,7 +168,9 @@ fn over_angles(harmonics: &[Complex64], weights: &[Complex64], fourier: &mut Fou
 
 /// Noise of one section: harmonics as measured again, and what it adds over the angles to the true profile and to the processed one, each with its
 /// largest.
+#[derive(Default)]
 struct Drawn {
+    truth: Vec<Complex64>,
     again: Vec<Complex64>,
     over_angles: [(Vec<f64>, f64); 2],
 }
@@ -211,8 +222,7 @@ impl Profiles<'_> {
             let undisturbed = &self.undisturbed_um[kind][0];
             match noise {
                 Some(noise) => {
-                    whole.clear();
-                    whole.extend(undisturbed.iter().zip(noise[0].iter()).map(|(form, noise)| form + noise));
+                    noise[0].added_to(undisturbed, &mut whole);
                     look(&whole, found);
                 }
                 None => look(undisturbed, found),
@@ -231,13 +241,13 @@ impl Profiles<'_> {
         };
         let marks_um: Vec<Vec<Vec<f64>>> =
             sections.iter().map(|section| self.beside_waves(section, &mut fourier)).collect();
-        let mut random = ChaCha8Rng::seed_from_u64(draws.seed.wrapping_add(form as u64));
         let mut with_marks: Vec<Vec<f64>> = vec![Vec::new(); sections.len()];
+        let mut drawn: Vec<Drawn> = sections.iter().map(|_| Drawn::default()).collect();
         for transform in 0..draws.transforms {
-            let wider = draws.wider(&mut random);
-            let drawn: Vec<Drawn> = (sections.iter().zip(&mut sources))
-                .map(|(section, errors)| self.noise(section, &section.forms[form], errors, &wider, &mut fourier))
-                .collect();
+            let wider = draws.wider(form, transform);
+            for ((section, errors), drawn) in sections.iter().zip(&mut sources).zip(&mut drawn) {
+                self.noise(section, &section.forms[form], errors, &wider, &mut fourier, drawn);
+            }
             for turn in 0..TURNS {
                 // Other angles in each transform, so that no place is always the same.
                 let from = (turn * angles + transform * angles / draws.transforms) / TURNS % angles;
@@ -290,25 +300,27 @@ impl Profiles<'_> {
         [of_form, of_measurement]: &mut [Errors; 2],
         wider: &[f64],
         fourier: &mut Fourier,
-    ) -> Drawn {
-        let (of_form, mut again) = (of_form.harmonics(), of_measurement.harmonics());
+        drawn: &mut Drawn,
+    ) {
+        let Drawn { truth, again, over_angles: [of_truth, of_again] } = drawn;
+        of_form.harmonics(truth);
+        of_measurement.harmonics(again);
         // Above, marks alone see noise.
-        if section.marks.all.is_empty() {
-            again.truncate(self.weights.len());
-        }
-        let mut truth = Vec::with_capacity(again.len());
-        let both = again.iter_mut().zip(of_form).zip(form.spread.iter().zip(&form.noise).zip(wider));
-        for ((again, of_form), ((spread, noise), wider)) in both {
+        let seen = if section.marks.all.is_empty() { self.weights.len() } else { section.kept.len() };
+        truth.truncate(seen);
+        again.truncate(seen);
+        let both = truth.iter_mut().zip(again.iter_mut()).zip(form.spread.iter().zip(&form.noise).zip(wider));
+        for ((truth, again), ((spread, noise), wider)) in both {
             let noise = noise * wider;
-            let of_truth = of_form * (spread * noise);
-            *again = of_truth + *again * noise;
-            truth.push(of_truth);
+            *truth *= spread * noise;
+            *again = *truth + *again * noise;
         }
-        let with_largest = |noise_um: &[f64]| (noise_um.to_vec(), largest(noise_um));
         let weighted = truth.iter().zip(&self.weights).map(|(noise, weight)| noise * weight);
-        let of_truth = with_largest(fourier.synthesise(weighted));
+        fourier.synthesise_into(weighted, &mut of_truth.0);
         let kept = again.iter().zip(&section.kept).zip(&self.weights);
-        let of_again = with_largest(fourier.synthesise(kept.map(|((noise, kept), weight)| noise * weight * *kept)));
-        Drawn { again, over_angles: [of_truth, of_again] }
+        fourier.synthesise_into(kept.map(|((noise, kept), weight)| noise * weight * *kept), &mut of_again.0);
+        for (noise_um, largest_um) in [of_truth, of_again] {
+            *largest_um = largest(noise_um);
+        }
     }
 }

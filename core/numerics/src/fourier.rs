@@ -130,15 +130,25 @@ impl Fourier {
 
     /// One turn of the signal that has these harmonics from order 0; orders above Nyquist must not occur.
     pub fn synthesise(&mut self, harmonics: impl IntoIterator<Item = Complex64>) -> &[f64] {
-        self.spectrum.fill(Complex64::ZERO);
-        let kept = max_order(self.signal.len()) + 1;
-        for (bin, harmonic) in self.spectrum[..kept].iter_mut().zip(harmonics) {
-            *bin = 0.5 * harmonic;
-        }
-        self.spectrum[0] = Complex64::new(2.0 * self.spectrum[0].re, 0.0);
-        let scratch = &mut self.scratch[..self.inverse.get_scratch_len()];
-        let _ = self.inverse.process_with_scratch(&mut self.spectrum, &mut self.signal, scratch);
+        let mut signal = std::mem::take(&mut self.signal);
+        self.synthesise_into(harmonics, &mut signal);
+        self.signal = signal;
         &self.signal
+    }
+
+    /// The same into `signal`, which becomes a turn long.
+    pub fn synthesise_into(&mut self, harmonics: impl IntoIterator<Item = Complex64>, signal: &mut Vec<f64>) {
+        let length = self.inverse.len();
+        let mut filled = 0;
+        for (bin, harmonic) in self.spectrum[..=max_order(length)].iter_mut().zip(harmonics) {
+            *bin = 0.5 * harmonic;
+            filled += 1;
+        }
+        self.spectrum[filled..].fill(Complex64::ZERO);
+        self.spectrum[0] = Complex64::new(2.0 * self.spectrum[0].re, 0.0);
+        signal.resize(length, 0.0);
+        let scratch = &mut self.scratch[..self.inverse.get_scratch_len()];
+        let _ = self.inverse.process_with_scratch(&mut self.spectrum, signal, scratch);
     }
 }
 

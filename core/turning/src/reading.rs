@@ -7,8 +7,9 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::profile::Profile;
-use runout_draws::{DRAWS, Errors, TURNS_OF_A_DRAW, monte_carlo_of, seed};
+use runout_draws::{Draws, Measured, seed};
 use runout_numerics::{Complex64, fourier::Fourier};
+use runout_standards::roundness::ront_lsci_um;
 
 /// Points a wave of the highest order: a crest between two of them is at most 2 % of that order's amplitude higher.
 const POINTS_A_WAVE: usize = 16;
@@ -83,7 +84,8 @@ impl ReadingValues {
             let level = scatter.first().copied().unwrap_or_default();
             (turns as f64 * (level + 0.5 * scatter.iter().skip(1).sum::<f64>())).sqrt()
         });
-        let (tir_um, tir_std_um) = run_out(&mean, variance.as_deref(), seed(&[&profile.object, setup, sensor]));
+        let squares = 2 * turns.saturating_sub(1);
+        let (tir_um, tir_std_um) = run_out(&mean, variance.clone(), squares, seed(&[&profile.object, setup, sensor]));
         Some(Self {
             setup: setup.to_owned(),
             sensor: sensor.to_owned(),
@@ -121,27 +123,21 @@ fn diagonal(matrices: &[Complex64], channels: usize, channel: usize) -> Vec<f64>
     own.map(|entry| entry.re.max(0.0)).collect()
 }
 
-/// Peak-to-valley of Re Σ cₙ e^{−inΦ} over the turn without its level, with its standard uncertainty.
-fn run_out(mean: &[Complex64], variance: Option<&[f64]>, seed: u64) -> (f64, Option<f64>) {
+/// Peak-to-valley of Re Σ cₙ e^{−inΦ} over the turn without its level, with its standard uncertainty; variances are known from so many squares.
+fn run_out(mean: &[Complex64], variance: Option<Vec<f64>>, squares: usize, seed: u64) -> (f64, Option<f64>) {
     let points = (POINTS_A_WAVE * mean.len()).next_power_of_two();
-    let mut fourier = Fourier::new(points);
-    let without_level =
-        mean.iter().enumerate().map(|(order, value)| if order == 0 { Complex64::ZERO } else { value.conj() });
-    let turn = fourier.synthesise(without_level.collect::<Vec<_>>()).to_vec();
-    let mut errors = variance.and_then(|variance| Errors::new(variance, 1, seed));
-    let mut drawn = turn.clone();
-    let draws = if errors.is_some() { DRAWS } else { 0 };
-    let found = monte_carlo_of(draws, draws.div_ceil(TURNS_OF_A_DRAW), |disturbed, found| {
-        if let (true, Some(errors)) = (disturbed, &mut errors) {
-            errors.draw(&mut fourier, &turn, &mut drawn);
-        }
-        let [low, high] = drawn
-            .iter()
-            .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| [low.min(*value), high.max(*value)]);
-        found.push(high - low);
+    let harmonics: Vec<Complex64> =
+        mean.iter().enumerate().map(|(order, value)| if order == 0 { Complex64::ZERO } else { value.conj() }).collect();
+    let tir_um = ront_lsci_um(Fourier::new(points).synthesise(harmonics.iter().copied()));
+    let draws = variance.and_then(|variance| {
+        let squares = vec![squares; harmonics.len()];
+        Draws::of_section(&Measured { harmonics, variance, squares, lowest: 1 }, seed)
     });
-    let first = found.into_iter().next();
-    first.map_or((f64::NAN, None), |(value, uncertainty)| (value, uncertainty.map(|uncertainty| uncertainty.std)))
+    let known = draws.and_then(|draws| {
+        let profiles = draws.profiles(|_| Complex64::ONE, points, |_, _| ());
+        profiles.values_of_section(|turn, found| found.push(ront_lsci_um(turn))).pop()?.uncertainty
+    });
+    (tir_um, known.map(|known| known.std))
 }
 
 #[cfg(test)]

@@ -4,9 +4,9 @@
 
 #![allow(clippy::inline_always, reason = "see runout_numerics::lanes")]
 
-use super::{Angles, Points, ends_um};
+use super::{Angles, Points};
 use runout_draws::DrawnErrors;
-use runout_numerics::lanes::{NullaryFnOnce, load, vectorised};
+use runout_numerics::lanes::{NullaryFnOnce, vectorised};
 
 /// By how much, in parts of the largest of some errors, they change a crest more than a height: within half a step, the weights of the three heights
 /// in a parabola are 1.25 together, without sign. A crest exceeds its highest point by an eighth of the step to one beside it at most, half of this.
@@ -38,6 +38,14 @@ pub struct Heights<'a> {
     rise: f64,
 }
 
+/// Heights and errors, with what is found on the way.
+#[derive(Debug, Clone, Default)]
+pub struct Sum {
+    heights: Vec<f64>,
+    /// The lowest and the highest of each [`CHUNK`], and its first place.
+    ends: Vec<(usize, [f64; 2])>,
+}
+
 impl<'a> Heights<'a> {
     /// Of heights, of which missing ones are NaN.
     #[must_use]
@@ -51,75 +59,124 @@ impl<'a> Heights<'a> {
     /// The lowest and the highest of them with crests between the angles, and the root mean square of them; NaN of nothing.
     #[must_use]
     pub fn undisturbed(&self) -> ([f64; 2], f64) {
-        let squares = self.undisturbed.iter().map(|height| height * height).sum::<f64>();
-        self.of(self.undisturbed, squares, 0.0)
+        self.with(&DrawnErrors::new(&vec![0.0; self.undisturbed.len()]), &mut Sum::default())
     }
 
     /// The same with errors added.
     #[must_use]
-    pub fn with(&self, errors: &DrawnErrors, sum: &mut Vec<f64>) -> ([f64; 2], f64) {
-        sum.resize(self.undisturbed.len(), 0.0);
-        let [first, others] = errors.parts();
-        let (of_first, of_others) = sum.split_at_mut(first.len());
-        let (heights, other_heights) = self.undisturbed.split_at(first.len());
-        let squares = vectorised(Sums { heights, errors: first, sum: of_first })
-            + vectorised(Sums { heights: other_heights, errors: others, sum: of_others });
-        self.of(sum, squares, errors.largest_um())
-    }
-
-    fn of(&self, heights: &[f64], squares: f64, largest: f64) -> ([f64; 2], f64) {
-        let (count, rise) = (heights.len(), self.rise + LIFT * largest);
-        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-        for (chunk, first) in heights.chunks(CHUNK).zip((0..).step_by(CHUNK)) {
-            let [lowest, highest] = ends_um(chunk);
-            // What is far from both ends found so far has no crest beyond them.
-            if highest > high - rise || lowest < low + rise {
-                for (point, height) in chunk.iter().enumerate() {
-                    if *height > high - rise || *height < low + rise {
-                        let crest = lifted(around(first + point, count).map(|point| heights[point]));
-                        (low, high) = (low.min(crest), high.max(crest));
-                    }
+    pub fn with(&self, errors: &DrawnErrors, sum: &mut Sum) -> ([f64; 2], f64) {
+        let count = self.undisturbed.len();
+        sum.heights.resize(count, 0.0);
+        sum.ends.clear();
+        let mut squares = 0.0;
+        let mut first = 0;
+        for errors in errors.parts() {
+            let places = first..first + errors.len();
+            let (heights, of) = (&self.undisturbed[places.clone()], &mut sum.heights[places]);
+            squares += vectorised(Adding { heights, errors, sum: of, first, ends: &mut sum.ends });
+            first += errors.len();
+        }
+        let rise = self.rise + LIFT * errors.largest_um();
+        let all = sum.ends.iter().map(|(_, ends)| ends);
+        let [low, high] =
+            all.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], ends| [low.min(ends[0]), high.max(ends[1])]);
+        let mut ends = if low > high { [f64::NAN; 2] } else { [low, high] };
+        // What is far from both ends has no crest beyond them.
+        let (above, below) = (high - rise, low + rise);
+        let is_near = |[low, high]: [f64; 2]| high > above || low < below;
+        let mut starts = sum.ends.iter().peekable();
+        while let Some((start, of_chunk)) = starts.next() {
+            let end = starts.peek().map_or(count, |(next, _)| *next);
+            for place in if is_near(*of_chunk) { *start..end } else { 0..0 } {
+                let height = sum.heights[place];
+                if is_near([height; 2]) {
+                    let crest = lifted(around(place, count).map(|place| sum.heights[place]));
+                    ends = [ends[0].min(crest), ends[1].max(crest)];
                 }
             }
         }
-        let ends = if low > high { [f64::NAN; 2] } else { [low, high] };
         (ends, (squares / count as f64).sqrt())
     }
 }
 
-/// Points that are looked at together.
+/// Points whose ends are found together.
 const CHUNK: usize = 64;
 
-/// Fills `sum` with heights and errors, and gives its sum of squares.
-struct Sums<'a> {
+/// Fills `sum` with heights and errors, adds the ends of each chunk, and gives the sum of squares.
+struct Adding<'a> {
     heights: &'a [f64],
     errors: &'a [f64],
     sum: &'a mut [f64],
+    /// Place of the first.
+    first: usize,
+    ends: &'a mut Vec<(usize, [f64; 2])>,
 }
 
-impl NullaryFnOnce for Sums<'_> {
+/// Points that are added at once.
+const LANES: usize = 16;
+
+impl NullaryFnOnce for Adding<'_> {
     type Output = f64;
 
     #[inline(always)]
     fn call(self) -> f64 {
-        const LANES: usize = 16;
-        let Self { heights, errors, sum } = self;
+        let Self { heights, errors, sum, first, ends } = self;
         let mut squares = [0.0; LANES];
-        let whole = sum.len() - sum.len() % LANES;
-        for place in (0..whole).step_by(LANES) {
-            let [heights, errors]: [[f64; LANES]; 2] = [load(heights, place), load(errors, place)];
-            for (lane, sum) in sum[place..place + LANES].iter_mut().enumerate() {
-                *sum = heights[lane] + errors[lane];
-                squares[lane] += *sum * *sum;
+        let (heights, last_heights) = heights.as_chunks::<CHUNK>();
+        let (errors, last_errors) = errors.as_chunks::<CHUNK>();
+        let (sum, last_sum) = sum.as_chunks_mut::<CHUNK>();
+        for (chunk, ((heights, errors), sum)) in heights.iter().zip(errors).zip(sum).enumerate() {
+            let (mut low, mut high) = ([f64::INFINITY; LANES], [f64::NEG_INFINITY; LANES]);
+            let lanes = heights.as_chunks::<LANES>().0.iter().zip(errors.as_chunks::<LANES>().0);
+            for ((heights, errors), sum) in lanes.zip(sum.as_chunks_mut::<LANES>().0) {
+                // A loop for each: of all together the compiler makes no vectors.
+                let mut both = [0.0; LANES];
+                for lane in 0..LANES {
+                    both[lane] = heights[lane] + errors[lane];
+                }
+                for lane in 0..LANES {
+                    squares[lane] += both[lane] * both[lane];
+                }
+                for lane in 0..LANES {
+                    low[lane] = lower(low[lane], both[lane]);
+                }
+                for lane in 0..LANES {
+                    high[lane] = higher(high[lane], both[lane]);
+                }
+                *sum = both;
             }
+            for half in [8, 4, 2, 1] {
+                for lane in 0..half {
+                    low[lane] = lower(low[lane], low[lane + half]);
+                    high[lane] = higher(high[lane], high[lane + half]);
+                }
+            }
+            ends.push((first + CHUNK * chunk, [low[0], high[0]]));
         }
-        let rest = sum[whole..].iter_mut().zip(heights[whole..].iter().zip(&errors[whole..]));
-        let rest = rest.map(|(sum, (height, error))| {
+        let mut of_last = [f64::INFINITY, f64::NEG_INFINITY];
+        let mut squares = squares.iter().sum::<f64>();
+        for (sum, (height, error)) in last_sum.iter_mut().zip(last_heights.iter().zip(last_errors)) {
             *sum = height + error;
-            *sum * *sum
-        });
-        rest.sum::<f64>() + squares.iter().sum::<f64>()
+            squares += *sum * *sum;
+            of_last = [of_last[0].min(*sum), of_last[1].max(*sum)];
+        }
+        if !last_sum.is_empty() {
+            ends.push((first + CHUNK * heights.len(), of_last));
+        }
+        squares
     }
+}
+
+/// The lower of two; the first where the second is no number.
+#[inline(always)]
+fn lower(one: f64, other: f64) -> f64 {
+    if other < one { other } else { one }
+}
+
+/// The higher of two; the first where the second is no number.
+#[inline(always)]
+fn higher(one: f64, other: f64) -> f64 {
+    if other > one { other } else { one }
 }
 
 /// Heights with their crests, and how far aside of its angle each is, in rad.

@@ -160,8 +160,7 @@ impl Disturbed<'_> {
     }
 
     fn of_all(&mut self, drawn: &DrawnErrors) -> Option<Values> {
-        self.drawn_um.clear();
-        self.drawn_um.extend(self.form_um.iter().zip(drawn.iter()).map(|(form, error)| form + error));
+        drawn.added_to(self.form_um, &mut self.drawn_um);
         if self.reference == Reference::LeastSquares {
             self.points.set_profile(self.angles, &self.drawn_um, self.radius_mm);
             let circle = self.points.reference(self.reference)?;

@@ -28,7 +28,7 @@ mod warm;
 
 use super::near::Course;
 pub use super::reference::{Reference, Undetermined};
-pub use crests::Heights;
+pub use crests::{Heights, Sum};
 pub use disturbed::{CircleSearch, Disturbed};
 pub use points::{Angles, Points};
 pub use series::{Series, between_angles};

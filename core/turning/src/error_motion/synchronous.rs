@@ -10,7 +10,7 @@ use runout_draws::{self as draws, Draws, Interval, KINDS, Uncertainty, drawn_ang
 use runout_numerics::{Complex64, fourier::Fourier};
 use runout_standards::{
     Value,
-    roundness::{Angles, Heights, Points, ront_lsci_um},
+    roundness::{Angles, Heights, Points, Sum, ront_lsci_um},
 };
 
 /// Points on a wave where errors are drawn.
@@ -68,7 +68,7 @@ impl Synchronous {
             if centre.is_linear() {
                 let of_kind = |kind| Heights::new(&profiles.undisturbed_um(kind)[0]);
                 let heights: Vec<Heights> = (0..KINDS).map(of_kind).collect();
-                let mut sum = Vec::new();
+                let mut sum = Sum::default();
                 return profiles.values(|kind, noise, found| {
                     let plot = &heights[kind];
                     let ([low, high], rms) =

@@ -11,7 +11,7 @@ use runout_numerics::{
 };
 use runout_standards::{
     Value,
-    roundness::{Angles, CircleSearch, Disturbed, Heights, Points, Reference, Series, Values},
+    roundness::{Angles, CircleSearch, Disturbed, Heights, Points, Reference, Series, Sum, Values},
 };
 
 /// Points on a wave where values are found: contacts between them are sought from there.
@@ -89,7 +89,7 @@ impl Form {
                 (0..KINDS).map(&mut about).collect()
             })
             .collect();
-        let mut sum = Vec::new();
+        let mut sum = Sum::default();
         profiles.values(|kind, noise, found| {
             let noise = noise.map(|noise| &noise[0]);
             for (reference, about) in references.iter().zip(&mut circles) {

@@ -3,7 +3,10 @@
 use super::{Filter, Found, roundness::angles_to_draw, section::Form};
 use runout_draws::KINDS;
 use runout_numerics::Complex64;
-use runout_standards::{roundness::Heights, slope::steepest_um_per_rad};
+use runout_standards::{
+    roundness::{Heights, Sum},
+    slope::steepest_um_per_rad,
+};
 
 /// Points on a wave where errors are drawn: slopes are those of the highest orders.
 const DRAWN_POINTS_A_WAVE: usize = 6;
@@ -24,7 +27,7 @@ impl Form {
         let Some(draws) = self.draws() else { return Found::from((value, None)) };
         let profiles = draws.profiles(weight, angles, |_, slopes| self.at.gaps.blank(slopes));
         let heights: Vec<Heights> = (0..KINDS).map(|kind| Heights::new(&profiles.undisturbed_um(kind)[0])).collect();
-        let mut sum = Vec::new();
+        let mut sum = Sum::default();
         let found = profiles.values(|kind, noise, found| {
             let slopes = &heights[kind];
             let ([low, high], _) = noise.map_or_else(|| slopes.undisturbed(), |noise| slopes.with(&noise[0], &mut sum));

@@ -1,11 +1,10 @@
 //! Texture values of one section around the part.
 
 use super::{Evaluate, Filter, Found, Group, Label, POINTS_A_WAVE, labelled, section::Form};
-use runout_draws::{Errors, NORMAL_95, student_95};
 use runout_numerics::fourier::Fourier;
 use runout_standards::{
     Value,
-    drawn::{Drawn, PAIRS, Sensitivity, in_pairs, remove_noise},
+    drawn::{Drawn, Sensitivity},
     texture::{self, Kind, Settings},
 };
 
@@ -75,9 +74,17 @@ impl Form {
         let settings = evaluate.profile_settings(kind, std::f64::consts::TAU * self.radius_mm);
         let profile_um = self.profile(&filter, &mut Fourier::new(self.fine(&filter)));
         let values = texture::around(&profile_um, self.radius_mm, &settings).values();
-        let drawn = self.drawn(&filter, |profile_um| {
-            texture::heights_around(profile_um, self.radius_mm, &settings).values().to_vec()
-        });
+        let known = self.known(
+            |order| filter.weight(order),
+            self.drawn_angles(&filter),
+            |profile_um, found| {
+                found.extend(texture::heights_around(profile_um, self.radius_mm, &settings).values());
+            },
+        );
+        let found = |index: usize, value: f64, reason: Option<&str>| match (known.get(index), reason) {
+            (Some(_), Some(reason)) => Found { no_uncertainty: Some(reason.to_owned()), ..Found::of(value, None) },
+            (known, _) => Found::of(value, known),
+        };
         let standard = |clause: &str| format!("ISO 21920-2:2021, {clause}");
         let mut labels: Vec<Label> = kind
             .parameters()
@@ -86,12 +93,12 @@ impl Form {
             .collect();
         let numbers = values.iter().enumerate();
         let mut numbers: Vec<Found> =
-            numbers.map(|(index, value)| found(drawn.as_ref(), index, *value, sensitivity(index))).collect();
+            numbers.map(|(index, value)| found(index, *value, sensitivity(index).err())).collect();
         for height_um in &evaluate.texture.heights_um {
             let reference = format!("{height_um} µm above the mean line");
             labels.push(Label::new(kind.material_ratio_symbol(), "%", standard("material ratio curve"), reference));
             let ratio = texture::material_ratio_percent(&profile_um, *height_um);
-            numbers.push(found(drawn.as_ref(), 0, ratio, Err(OF_PLATEAUS)));
+            numbers.push(found(0, ratio, Some(OF_PLATEAUS)));
         }
         labelled(labels, numbers, &filter, &self.held, self.at.coverage(self.angles))
     }
@@ -104,37 +111,6 @@ impl Form {
     /// Angles on which errors are drawn.
     fn drawn_angles(&self, filter: &Filter) -> usize {
         (DRAWN_POINTS_A_WAVE * filter.highest(self.held.highest)).next_multiple_of(WHOLE).max(WHOLE)
-    }
-
-    /// The form without its noise, on as many angles as its errors ask for.
-    fn without_noise(&self, filter: &Filter) -> (Vec<f64>, Fourier) {
-        let mut fourier = Fourier::new(self.drawn_angles(filter));
-        let mut forms = [filter.harmonics(&self.harmonics)];
-        remove_noise(&mut forms, &[filter.variance(&self.variance)], 2);
-        let [harmonics] = forms;
-        let mut form_um = fourier.synthesise(harmonics).to_vec();
-        self.at.gaps.blank(&mut form_um);
-        (form_um, fourier)
-    }
-
-    /// Values of the form without its noise and of draws about it; `None` where no errors are known.
-    fn drawn(&self, filter: &Filter, look: impl Fn(&[f64]) -> Vec<f64>) -> Option<Drawn> {
-        let wider = self.freedom.iter().map(|freedom| (student_95(*freedom as f64) / NORMAL_95).powi(2));
-        let wider = self.variance.iter().zip(wider.chain(std::iter::repeat(1.0)));
-        // As wide as their variance is badly known.
-        let variance: Vec<f64> = wider.map(|(variance, wider)| variance * wider).collect();
-        let mut errors = Errors::new(&filter.variance(&variance), 2, self.seed)?;
-        let (form_um, mut fourier) = self.without_noise(filter);
-        Some(in_pairs(
-            &form_um,
-            PAIRS,
-            |drawn| errors.fresh(&mut fourier, drawn),
-            |[above, below]| {
-                let of_above = look(above);
-                let of_below = if std::ptr::eq(above, below) { of_above.clone() } else { look(below) };
-                [of_above, of_below]
-            },
-        ))
     }
 }
 
