@@ -161,8 +161,6 @@ fn result(index: usize, separation: Separation) -> StationResult {
         angles: 2560,
         separation,
         profiles: Vec::new(),
-        values: Vec::new(),
-        motion_values: Vec::new(),
         truth: None,
     }
 }

@@ -6,12 +6,12 @@ use runout_core::{
     Complex64, Error, Result,
     azimuth::FacePlace,
     error_motion::{CENTRE, ErrorMotion},
+    evaluate::Value,
     measurement::StationTruth,
     numerics::fourier::Fourier,
     rig::{Looks, SensorConfig},
     separation::{Quantity, Separation},
     stage::StationSeparator,
-    standards::Value,
 };
 use runout_spindle::{
     selection::Selection,

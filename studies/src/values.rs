@@ -15,12 +15,12 @@ use std::{
 
 use runout_core::{
     Error, Result,
+    evaluate::Value,
     pipeline::{
         INCLUDE_KEY, Pipeline, Registry,
         document::Sources,
         run::{Silent, run},
     },
-    standards::Value,
     summary::Summary,
 };
 use runout_hdf5::{WriteOptions, write_measurement};

@@ -5,6 +5,7 @@
 use std::{num::NonZeroUsize, path::Path};
 
 use runout_core::{
+    evaluate::Value,
     measurement::Recording,
     model::diagnosis::Verdict,
     pipeline::{
@@ -15,7 +16,6 @@ use runout_core::{
     },
     rig::Gaps,
     standards::{
-        Value,
         reference::Reference,
         roundness::{Angles, Points},
     },

@@ -6,7 +6,7 @@ mod reading;
 mod values;
 
 use runout_core::{
-    standards::Value,
+    evaluate::Value,
     summary::{CaptureSummary, SectionSummary, StationSummary, Summary},
 };
 

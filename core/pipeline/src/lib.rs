@@ -20,7 +20,6 @@
 
 pub mod atomic_file;
 pub mod effects;
-pub mod height_grid;
 pub mod pipeline;
 pub mod points;
 pub mod stage;
@@ -30,10 +29,11 @@ pub use runout_closed_loop as model;
 pub use runout_consistency as consistency;
 pub use runout_draws as draws;
 pub use runout_error::{Error, ErrorKind, Result, fault};
+pub use runout_evaluate::{self as evaluate, error_motion, height_grid};
 pub use runout_numerics::{self as numerics, Complex64};
 pub use runout_standards as standards;
 pub use runout_table as table;
 pub use runout_turning::{
-    azimuth, checksum, creep, encoder, error_motion, input_file, inspection, level_step, mains, marker, measurement,
-    near_tone, neighbours, profile, provenance, reading, rig, separation, spread, station, surface,
+    azimuth, checksum, creep, encoder, input_file, inspection, level_step, mains, marker, measurement, near_tone,
+    neighbours, profile, provenance, reading, rig, separation, spread, station, surface,
 };

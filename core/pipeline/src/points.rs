@@ -3,6 +3,7 @@
 use std::{collections::HashMap, ops::Range, path::PathBuf};
 
 use runout_error::{Error, Result};
+use runout_evaluate::height_grid::HeightGrid;
 use runout_turning::{input_file::InputFile, provenance::Input};
 
 pub mod mistakes;
@@ -103,6 +104,27 @@ pub struct Trace {
 }
 
 impl Points {
+    /// The nodes of a grid that have a height, row by row, as points of a file.
+    #[must_use]
+    pub fn of_grid(grid: HeightGrid, input: PathBuf) -> Self {
+        let count = grid.height_nm.len() - grid.holes();
+        let [mut x, mut y] = [Vec::with_capacity(count), Vec::with_capacity(count)];
+        for (row, heights) in grid.height_nm.chunks(grid.columns.max(1)).enumerate() {
+            let row_y_mm = grid.origin_y_mm + grid.step_y_mm * row as f64;
+            for (column, _) in heights.iter().enumerate().filter(|(_, height)| height.is_finite()) {
+                x.push(grid.origin_x_mm + grid.step_x_mm * column as f64);
+                y.push(row_y_mm);
+            }
+        }
+        let mut heights = grid.height_nm;
+        heights.retain(|height| height.is_finite());
+        let std = grid.std_nm.map(|std| vec![std; heights.len()]);
+        let values = [Some(x), Some(y), Some(heights), std];
+        let columns = HeightGrid::COLUMNS.iter().zip(values);
+        let columns = columns.filter_map(|(name, values)| Some(Column { name: (*name).into(), values: values? }));
+        Self { input, columns: columns.collect(), ..Self::default() }
+    }
+
     /// Every file behind them.
     #[must_use]
     pub fn inputs(&self) -> Vec<PathBuf> {

@@ -1,10 +1,6 @@
 //! What a run found, for people and programs.
 
-mod limit;
-mod value;
-
-pub use limit::{Decision, Limit, LimitSummary, LimitValue};
-pub use value::{NamedValue, PlacedValue};
+pub use runout_evaluate::{Decision, Limit, LimitSummary, LimitValue, NamedValue, PartSummary, PlacedValue, Value};
 
 use std::{collections::BTreeMap, path::PathBuf};
 
@@ -13,7 +9,6 @@ use serde::{Deserialize, Deserializer, Serialize};
 
 use runout_closed_loop::diagnosis::{self, Correction};
 use runout_consistency::{Check, Test, refuted_by};
-use runout_standards::Value;
 use runout_turning::{provenance::Provenance, reading::ReadingValues, separation::Assessment, surface::Meeting};
 
 /// What a run found, for people and programs.
@@ -275,19 +270,4 @@ pub struct SurfaceSummary {
     pub interpolation: String,
     /// Where sections of different sensors meet, and how well they agree.
     pub meetings: Vec<Meeting>,
-}
-
-/// Values of all sections together.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct PartSummary {
-    /// Sections that they are of.
-    pub sections: usize,
-    /// First and last place of a section along the axis, in mm.
-    pub z_mm: [f64; 2],
-    /// Equal angles at which errors of each section were drawn; itself it is looked at on more.
-    pub angles: usize,
-    /// The standards' values.
-    pub values: Vec<Value>,
-    /// What the values are not.
-    pub remarks: Vec<String>,
 }

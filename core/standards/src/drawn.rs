@@ -33,7 +33,7 @@ pub enum Sensitivity {
 }
 
 impl Sensitivity {
-    /// Largest shift in standard deviations. By simulation: `cargo test -p runout-core --lib intervals_of -- --ignored`.
+    /// Largest shift in standard deviations. By simulation: `cargo test -p runout-evaluate --lib intervals_of -- --ignored`.
     fn largest_shift(self) -> f64 {
         match self {
             Self::Mean => 3.0,

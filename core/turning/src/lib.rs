@@ -1,5 +1,5 @@
 //! What all recorded turns share: the rig, captures read in blocks, inspection, profiles with their covariance, separation into
-//! form and motion, error motion values, and the surface over all stations.
+//! form and motion, and the surface over all stations.
 //!
 //! Lengths of displacement and form are in micrometres, geometry in millimetres, angles in radians inside the code (`_deg` in files).
 //!
@@ -25,7 +25,6 @@ pub mod calibrated;
 pub mod checksum;
 pub mod creep;
 pub mod encoder;
-pub mod error_motion;
 pub mod groove;
 pub mod input_file;
 pub mod inspection;

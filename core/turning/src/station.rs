@@ -1,7 +1,6 @@
 //! What is known of one station once it is separated.
 
 use runout_numerics::{Complex64, fourier::Fourier};
-use runout_standards::Value;
 
 use crate::{
     measurement::StationTruth,
@@ -22,10 +21,6 @@ pub struct StationResult {
     pub separation: Separation,
     /// The averages that it came from; empty for measured points.
     pub profiles: Vec<Profile>,
-    /// The standards' values, section by section.
-    pub values: Vec<Vec<Value>>,
-    /// Error motion values of the axis; empty where no spread over the turns is known.
-    pub motion_values: Vec<Value>,
     /// What the recording says is true.
     pub truth: Option<StationTruth>,
 }

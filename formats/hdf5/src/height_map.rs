@@ -88,7 +88,7 @@ impl Loader for HeightMapFile {
         let (grid, links) = read(&self.path, self.follow_links)?;
         let inputs = links.inputs();
         let besides = inputs.iter().skip(1).map(|file| file.path().to_owned()).collect();
-        let mut points = Points { besides, opened: inputs, ..grid.points(self.path.clone()) };
+        let mut points = Points { besides, opened: inputs, ..Points::of_grid(grid, self.path.clone()) };
         points.remarks.extend(superblock::remark(links.input())?);
         Ok(Source::Points(points))
     }

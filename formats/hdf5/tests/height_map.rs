@@ -1,7 +1,7 @@
 //! Height maps: written and read, with holes, and what is wrong with them by name.
 
 use hdf5_metno::File;
-use runout_core::height_grid::HeightGrid;
+use runout_core::{height_grid::HeightGrid, points::Points};
 use runout_hdf5::{read_height_map, write_height_map};
 
 fn grid() -> HeightGrid {
@@ -52,7 +52,7 @@ fn a_map_is_read_as_it_was_written() {
     let read = read_height_map(&path).unwrap();
     assert!(read.height_nm[5].is_nan());
     assert_eq!(format!("{read:?}"), format!("{:?}", grid()));
-    let points = read.points(path);
+    let points = Points::of_grid(read, path);
     assert_eq!(points.column("x_mm").unwrap().len(), 11);
     assert!((points.column("height_nm").unwrap()[5] - 6.0).abs() < 1e-12);
     let place = ["x_mm", "y_mm"].map(|name| points.column(name).unwrap()[5]);

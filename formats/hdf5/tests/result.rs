@@ -51,8 +51,6 @@ pub(crate) fn station(name: &str) -> StationResult {
             warnings: Vec::new(),
         },
         profiles: Vec::new(),
-        values: Vec::new(),
-        motion_values: Vec::new(),
         truth: None,
     }
 }

@@ -10,10 +10,10 @@ use runout_core::{
     Complex64,
     atomic_file::commit_all,
     draws::Uncertainty,
+    evaluate::Value,
     pipeline::{Context, StageConfig, run::StationTables},
     provenance::{Input, Provenance},
     separation::{Quantity, Residual, SectionAt, Separation},
-    standards::Value,
     station::StationResult,
     summary::{LostOrders, PartSummary, SectionSummary, StationSummary, Summary},
 };
@@ -63,16 +63,7 @@ fn station(index: usize, motion: bool) -> StationResult {
         warnings: Vec::new(),
     };
     let station = format!("s{index:02}");
-    StationResult {
-        station,
-        z_mm,
-        angles: ANGLES,
-        separation,
-        profiles: Vec::new(),
-        values: Vec::new(),
-        motion_values: Vec::new(),
-        truth: None,
-    }
+    StationResult { station, z_mm, angles: ANGLES, separation, profiles: Vec::new(), truth: None }
 }
 
 fn summary() -> Summary {

@@ -58,8 +58,6 @@ fn surface(separator: &LeastSquaresCylinder, points: &Points) -> Surface {
             angles: 720,
             separation,
             profiles: Vec::new(),
-            values: Vec::new(),
-            motion_values: Vec::new(),
             truth: None,
         });
     }

@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
-use runout_core::model::Setting;
+use runout_core::{model::Setting, points::Points};
 
 use crate::{
     config::FlyCuttingConfig,
@@ -22,7 +22,7 @@ fn config() -> FlyCuttingConfig {
 
 fn heights(effects: &str) -> Heights {
     let scenario: FlyCuttingScenario = toml::from_str(&format!("[cut]\n{CUT}{GRID}{effects}")).unwrap();
-    Heights::new(&scenario.heights().unwrap().points("map.h5".into()), &config()).unwrap().0
+    Heights::new(&Points::of_grid(scenario.heights().unwrap(), "map.h5".into()), &config()).unwrap().0
 }
 
 /// Each effect, small and far beyond the usual.

@@ -116,7 +116,7 @@ fn order_and_holes_do_not_matter() {
     let separator = separator(CUT);
     let mut grid = scenario(60, "noise_nm = 0.1").heights().unwrap();
     grid.height_nm[100..130].fill(f64::NAN);
-    let mut points = grid.points("map.h5".into());
+    let mut points = Points::of_grid(grid, "map.h5".into());
     let found = separator.separate(&points).unwrap();
     assert!(
         found.remarks.iter().any(|remark| remark.contains("30 of 3600 points have no height")),

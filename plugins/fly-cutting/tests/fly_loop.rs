@@ -5,7 +5,7 @@
 mod common;
 
 use common::{CUT, diagnose, listing, parameter, run, scenario, separator, value};
-use runout_core::model::diagnosis::Verdict;
+use runout_core::{model::diagnosis::Verdict, points::Points};
 
 const SIDE: usize = 160;
 
@@ -178,7 +178,7 @@ fn heights_in_another_unit_and_too_large_a_noise_are_never_explained() {
     let settings = runout_core::model::closed_loop::Settings::default();
     let fly = separator(CUT);
     let model = runout_core::stage::PointSeparator::model(&fly).unwrap();
-    let error = model.diagnose(&in_um.points("map.h5".into()), &settings).unwrap_err();
+    let error = model.diagnose(&Points::of_grid(in_um, "map.h5".into()), &settings).unwrap_err();
     assert!(error.to_string().contains("no tool leaves a smoother surface"), "{error}");
     let mut loud = scenario(90, line).heights().unwrap();
     loud.std_nm = Some(1.0);

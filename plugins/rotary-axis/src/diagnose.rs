@@ -359,7 +359,7 @@ pub(crate) fn typical_um(campaign: &Campaign) -> f64 {
 /// Values that both results have.
 fn moved(before: &[NamedValue], after: &[NamedValue]) -> Vec<Moved> {
     let both = before.iter().filter(|one| one.of.is_none()).filter_map(|one| {
-        let other = after.iter().find(|other| other.symbol == one.symbol && other.of == one.of)?;
+        let other = after.iter().find(|other| other.id() == one.id())?;
         Some(Moved {
             value: one.symbol.clone(),
             section: None,

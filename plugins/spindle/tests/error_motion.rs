@@ -11,6 +11,7 @@ use campaigns::campaign;
 use common::{FOUR_SENSORS, Sum, rig, value};
 use runout_core::{
     error_motion::{Centre, ErrorMotion},
+    evaluate::Value,
     inspection::Inspection,
     measurement::Recording,
     pipeline::{Context, StageConfig},
@@ -18,7 +19,7 @@ use runout_core::{
     rig::{Rig, Rotation},
     separation::{Quantity, Separation},
     stage::{AverageRequest, Averager, Preprocessor, Station, StationSeparator},
-    standards::{Value, reference::Reference},
+    standards::reference::Reference,
 };
 use runout_preprocess::SynchronousAverageConfig;
 use runout_spindle::{

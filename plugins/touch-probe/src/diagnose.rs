@@ -334,7 +334,7 @@ fn in_order(terms: &LinearTerms, prepared: &Prepared, fit: &LinearFit) -> Vec<f6
 /// Values that both results have.
 fn moved(before: &Outcome, after: &Outcome) -> Vec<Moved> {
     let number = |values: &[NamedValue], like: &NamedValue| {
-        values.iter().find(|one| one.symbol == like.symbol && one.of == like.of).and_then(|one| one.value)
+        values.iter().find(|one| one.id() == like.id()).and_then(|one| one.value)
     };
     let of = |value: &NamedValue| {
         Some(Moved {

@@ -1,6 +1,6 @@
 //! Error motion of the axis.
 
-use runout_core::{standards::Value, summary::StationSummary};
+use runout_core::{evaluate::Value, summary::StationSummary};
 
 use super::{unit, with_uncertainty};
 use crate::render::{

@@ -1,7 +1,7 @@
 use insta::assert_snapshot;
 use runout_core::{
     draws::Uncertainty,
-    standards::Value,
+    evaluate::Value,
     summary::{
         CaptureSummary, LostOrders, MotionTruth, RejectedTurnSummary, SectionSummary, StationSummary, Summary,
         SurfaceSummary,

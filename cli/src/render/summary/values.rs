@@ -1,7 +1,7 @@
 //! Values of all sections together, and limits.
 
 use runout_core::{
-    standards::Value,
+    evaluate::Value,
     summary::{Decision, LimitSummary, LimitValue, Summary},
 };
 

@@ -7,6 +7,7 @@ mod route;
 mod schema;
 
 use runout_error::fault::{Fault, known_names};
+use runout_evaluate::{Evaluate, EvaluateConfig};
 use std::path::{Path, PathBuf};
 
 use toml::de::DeValue;
@@ -17,7 +18,6 @@ pub use schema::{PlainTable, choice, pipeline_schema, plain_tables};
 
 use super::{
     document::{self, ConfigError, Document, Sources, Table, checked, required, table, tables},
-    evaluate::{Evaluate, EvaluateConfig},
     registry::{Context, Registry},
 };
 use crate::{

@@ -9,14 +9,13 @@ use corrected_rig::Change;
 
 use super::{
     config::{Pipeline, Route, exports::spare_inputs},
-    evaluate::Group,
     hidden_readings,
     observer::Observer,
     point_run::{self, PointResult},
     record_reader::{RecordReader, separate},
-    result::{Evaluation, complete, true_error},
     result_writer::{Finished, ResultWriter},
-    run::{projections, with_motion_values},
+    run::projections,
+    true_error::true_error,
     warnings::{DeclaredStations, TurnsOfAll},
 };
 use crate::{
@@ -29,6 +28,8 @@ use runout_closed_loop::{
     diagnosis::{Correction, Diagnosis, Estimated, Step, Truth},
 };
 use runout_error::{Error, ErrorKind, Result};
+use runout_evaluate::{EvaluatedStation, Group};
+use runout_turning::station::StationResult;
 use runout_turning::{profile::Profile, separation::Quantity};
 
 /// Runs the closed loop and writes `diagnosis.json`, and the exports of the final model where it has a form. These do not
@@ -117,21 +118,20 @@ fn diagnose_turns(
         let angles = station.profiles.first().map_or(0, |profile| profile.samples_per_rev);
         let truth = recording.truth(index)?;
         let complete = |separation, profiles, evaluate| {
-            let evaluation =
-                Evaluation { evaluate, radius_mm, rig: Some(line.rig), stations: recording.stations().len() };
-            complete(station.name.clone(), station.z_mm, angles, separation, profiles, truth.clone(), evaluation)
+            let (name, truth) = (station.name.clone(), truth.clone());
+            let result = StationResult { station: name, z_mm: station.z_mm, angles, separation, profiles, truth };
+            EvaluatedStation::of(result, evaluate, radius_mm, Some(line.rig), recording.stations().len())
         };
         let declared = complete(before, Vec::new(), &looked_at);
-        let result = complete(after, station.profiles, &pipeline.evaluate);
-        let result = with_motion_values(result, &pipeline.evaluate.centres, radius_mm);
-        diagnosis.moved.extend(moved::moved(&declared, &result, &looked_at, radius_mm, several));
-        for (errors, result) in errors.iter_mut().zip([&declared, &result]) {
+        let found = complete(after, station.profiles, &pipeline.evaluate);
+        diagnosis.moved.extend(moved::moved(&declared, &found, &looked_at, radius_mm, several));
+        for (errors, EvaluatedStation { result, .. }) in errors.iter_mut().zip([&declared, &found]) {
             let forms = (0..result.separation.sections.len()).map(Quantity::Form);
             errors.extend(forms.filter_map(|form| true_error(result, form)));
         }
         as_declared.take(&declared, line.rig);
-        turns.take(&result, line.rig);
-        writer.take(&result, pipeline.rig.as_ref())?;
+        turns.take(&found.result, line.rig);
+        writer.take(&found, pipeline.rig.as_ref())?;
     }
     let rms = |errors: &Vec<f64>| {
         let squares: f64 = errors.iter().map(|error| error * error).sum();

@@ -2,9 +2,7 @@
 
 use super::{
     config::{Pipeline, exports::spare_inputs},
-    evaluate::Evaluated,
     observer::{Observer, Silent},
-    result::{Evaluation, complete},
     result_writer::{Finished, ResultWriter},
 };
 use crate::{
@@ -15,8 +13,10 @@ use crate::{
 use runout_closed_loop::diagnosis::{Correction, Diagnosis};
 use runout_consistency::refuted_by;
 use runout_error::{Error, Result};
+use runout_evaluate::{Evaluated, EvaluatedStation};
 use runout_numerics::height_map::HeightMap;
 use runout_standards::areal::without_polynomial;
+use runout_turning::station::StationResult;
 
 pub(super) fn run(
     pipeline: &Pipeline,
@@ -74,16 +74,17 @@ impl PointResult<'_> {
         let mut surface = None;
         if let Some(Form { sections, radius_mm }) = evaluables.into_iter().find_map(Evaluable::into_form) {
             observer.begin(sections.len());
-            let evaluation = Evaluation { evaluate: &pipeline.evaluate, radius_mm, rig: None, stations: 1 };
             for separation in sections {
                 // As many angles as the surface has, or a multiple of them that the highest order fits on.
                 let angles = pipeline.surface.angles;
                 let angles = angles * (2 * separation.max_order() + 1).div_ceil(angles);
                 let at = separation.sections.first();
-                let (name, z_mm) = at.map_or((String::new(), f64::NAN), |section| (section.id.clone(), section.z_mm));
-                let result = complete(name, z_mm, angles, separation, Vec::new(), None, evaluation);
-                writer.take(&result, None)?;
-                observer.station(&result.station);
+                let (station, z_mm) =
+                    at.map_or((String::new(), f64::NAN), |section| (section.id.clone(), section.z_mm));
+                let result = StationResult { station, z_mm, angles, separation, profiles: Vec::new(), truth: None };
+                let station = EvaluatedStation::of(result, &pipeline.evaluate, radius_mm, None, 1);
+                writer.take(&station, None)?;
+                observer.station(&station.result.station);
             }
             surface = writer.build_surface(radius_mm)?;
         }

@@ -7,22 +7,23 @@ use super::{
         Pipeline,
         exports::{summary_path, written},
     },
-    evaluate::{Evaluate, Evaluated, Group, add_areal, add_generatrices, decide, part_summary},
     station_summary::summarise,
     tables::{StationTables, consistency_rows, correction_rows, named_value_rows},
     warnings::{Warnings, findings, of_checks, of_stations},
 };
 use crate::{
     atomic_file::{FolderLock, PendingFile, commit_all, commit_last_after_others},
-    height_grid::HeightGrid,
     stage::{About, Completed, Export, Exporter, PointSeparator, ResultInfo, Takes},
     summary::{LostOrders, NamedValue, PartSummary, Summary, SurfaceSummary},
 };
 use runout_closed_loop::diagnosis::{self, Correction, Diagnosis};
 use runout_consistency::Check;
 use runout_error::{Error, Result};
+use runout_evaluate::{
+    Evaluate, Evaluated, EvaluatedStation, Group, add_areal, add_generatrices, decide, height_grid::HeightGrid,
+    part_summary,
+};
 use runout_table::{TableRows, TableSpec};
-use runout_turning::station::StationResult;
 use runout_turning::{
     measurement::StationKey,
     provenance::{Input, Provenance, VERSION},
@@ -133,14 +134,15 @@ impl ResultWriter {
     }
 
     /// Takes a station's form and motion.
-    pub(super) fn take(&mut self, result: &StationResult, rig: Option<&Rig>) -> Result<()> {
+    pub(super) fn take(&mut self, station: &EvaluatedStation, rig: Option<&Rig>) -> Result<()> {
+        let result = &station.result;
         self.interrupted |= result.separation.sections.iter().any(|section| !section.gaps.is_empty());
         let tables = self.station_tables.rows(result, self.tables_wanted)?;
         self.write(&tables)?;
         if let Some(sections) = &mut self.sections {
             sections.add(result);
         }
-        self.summary.stations.push(summarise(result, rig));
+        self.summary.stations.push(summarise(station, rig));
         let checks = &result.separation.residual.checks;
         self.summary.consistency.extend(checks.iter().map(|check| check.clone().within(&result.station)));
         Ok(())

@@ -4,11 +4,9 @@ use std::num::NonZeroUsize;
 
 use super::{
     config::{Pipeline, Route, exports::spare_inputs},
-    evaluate::{Group, steepest_um_per_deg},
     outdated, point_run,
     read_ahead::write_behind,
     record_reader::{RecordReader, separate},
-    result::{Evaluation, complete, mark},
     result_writer::{CompleteFiles, Finished, ResultWriter},
     warnings::TurnsOfAll,
 };
@@ -19,16 +17,10 @@ pub use super::{
 use crate::stage::{Averager, Conditioner, Source, Station, StationSeparator};
 use crate::summary::Summary;
 use runout_error::{Error, ErrorKind, Result};
+use runout_evaluate::{EvaluatedStation, Group};
 use runout_numerics::threads;
-use runout_standards::Value;
 use runout_turning::station::StationResult;
-use runout_turning::{
-    error_motion::{Centre, ErrorMotion, behind_low_pass, with_jitter_of_marks},
-    measurement::Recording,
-    rig::Rig,
-    separation::Quantity,
-    spread::Projection,
-};
+use runout_turning::{measurement::Recording, rig::Rig, spread::Projection};
 
 impl Pipeline {
     /// Runs it on all threads: [`run`] without a progress bar.
@@ -114,24 +106,19 @@ fn run_turns(
         projections: projections(pipeline, separator, rig),
         alone,
     };
-    let evaluation = Evaluation {
-        evaluate: &pipeline.evaluate,
-        radius_mm: rig.part_radius_mm,
-        rig: Some(rig),
-        stations: recording.stations().len(),
-    };
+    let (radius_mm, stations) = (rig.part_radius_mm, recording.stations().len());
     let work = |index, station: Station| {
         let separation = separate(separator, &station, rig)?;
         let angles = station.profiles.first().map_or(0, |profile| profile.samples_per_rev);
         let truth = recording.truth(index)?;
-        let profiles = station.profiles;
-        let result = complete(station.name, station.z_mm, angles, separation, profiles, truth, evaluation);
-        Ok(with_motion_values(result, &pipeline.evaluate.centres, rig.part_radius_mm))
+        let Station { name: station, z_mm, profiles, .. } = station;
+        let result = StationResult { station, z_mm, angles, separation, profiles, truth };
+        Ok(EvaluatedStation::of(result, &pipeline.evaluate, radius_mm, Some(rig), stations))
     };
     let mut turns = TurnsOfAll::default();
-    let mut take = |result: StationResult| {
-        turns.take(&result, rig);
-        writer.take(&result, Some(rig))
+    let mut take = |station: EvaluatedStation| {
+        turns.take(&station.result, rig);
+        writer.take(&station, Some(rig))
     };
     let inputs = if alone {
         line.run(threads, observer, work, &mut take)?
@@ -154,29 +141,4 @@ pub(super) fn projections(pipeline: &Pipeline, separator: &dyn StationSeparator,
         Some(found.with_lines(directions).with_faces(faces))
     };
     (0..rig.setups.len()).map(projection).collect()
-}
-
-/// A station with its error motion values.
-pub(super) fn with_motion_values(result: StationResult, centres: &[Centre], radius_mm: f64) -> StationResult {
-    let mut motion_values = error_motion_values(&result, centres, radius_mm);
-    mark(motion_values.iter_mut(), &result.separation);
-    StationResult { motion_values, ..result }
-}
-
-fn error_motion_values(result: &StationResult, centres: &[Centre], radius_mm: f64) -> Vec<Value> {
-    let StationResult { station, z_mm, angles, separation, profiles, .. } = result;
-    if profiles.iter().all(|profile| profile.spread.is_none()) {
-        return Vec::new();
-    }
-    // A face's slope around the axis is none of the circumference.
-    let circle = |(_, quantity): &(usize, &Quantity)| matches!(quantity, Quantity::Form(_));
-    let forms = separation.unknowns.iter().enumerate().filter(circle);
-    let steepest = forms.map(|(unknown, _)| steepest_um_per_deg(&result.over_angle(unknown))).fold(0.0, f64::max);
-    let slope = steepest.to_degrees() / (1e3 * radius_mm);
-    let values = ErrorMotion { station, z_mm: *z_mm, angles: *angles, separation, profiles, slope }.values(centres);
-    let values = with_jitter_of_marks(values, profiles);
-    match result.half_power_upr() {
-        Some(half_power_upr) => behind_low_pass(values, separation, half_power_upr),
-        None => values,
-    }
 }

@@ -1,17 +1,18 @@
 //! The summary of one station, from its form, motion and turns.
 
-use super::result::true_error;
+use super::true_error::true_error;
 use crate::summary::{CaptureSummary, MotionTruth, RejectedTurnSummary, SectionSummary, StationSummary};
+use runout_evaluate::EvaluatedStation;
 use runout_turning::{
     azimuth::Azimuth,
     profile::{Profile, Rejection, TurnLength},
     reading::ReadingValues,
     rig::Rig,
     separation::{Quantity, SectionAt},
-    station::StationResult,
 };
 
-pub(super) fn summarise(result: &StationResult, rig: Option<&Rig>) -> StationSummary {
+pub(super) fn summarise(station: &EvaluatedStation, rig: Option<&Rig>) -> StationSummary {
+    let EvaluatedStation { result, values, motion_values } = station;
     let separation = &result.separation;
     let known = |value: f64| value.is_finite().then_some(value);
     let nothing = separation.has_no_observable_form();
@@ -24,7 +25,7 @@ pub(super) fn summarise(result: &StationResult, rig: Option<&Rig>) -> StationSum
             z_mm: at.z_mm,
             form_rms_um: result.form_rms_um(section).filter(|_| !nothing).map_or(f64::NAN, |(rms_um, _)| rms_um),
             form_std_um: unknown.filter(|_| !nothing).and_then(|unknown| known(separation.angle_std(unknown))),
-            values: result.values.get(section).cloned().unwrap_or_default(),
+            values: values.get(section).cloned().unwrap_or_default(),
             truth_form_rms_error_um: true_error(result, Quantity::Form(section)),
         }
     });
@@ -38,8 +39,8 @@ pub(super) fn summarise(result: &StationResult, rig: Option<&Rig>) -> StationSum
         sections,
         motion_along_deg: azimuth.map(Azimuth::degrees),
         readings: if nothing { readings(&result.profiles, rig) } else { Vec::new() },
-        motion_z_mm: plane_of_values(result),
-        motion_values: result.motion_values.clone(),
+        motion_z_mm: plane_of_values(station),
+        motion_values: motion_values.clone(),
         residual_rms_um: known(separation.residual.rms_um),
         expected_residual_rms_um: known(separation.residual.expected_rms_um),
         chi2_per_dof: known(separation.residual.chi2_per_dof),
@@ -123,7 +124,7 @@ fn capture_summary(profile: &Profile, rig: Option<&Rig>) -> CaptureSummary {
 }
 
 /// Where the radial values of error motion hold: midway between the sensors, not where the tables have x and y.
-fn plane_of_values(result: &StationResult) -> Option<f64> {
+fn plane_of_values(EvaluatedStation { result, motion_values, .. }: &EvaluatedStation) -> Option<f64> {
     let spread = result.profiles.iter().find_map(|profile| profile.spread.as_ref())?;
-    (!result.motion_values.is_empty()).then_some(spread.projection.z_mm + result.z_mm)
+    (!motion_values.is_empty()).then_some(spread.projection.z_mm + result.z_mm)
 }

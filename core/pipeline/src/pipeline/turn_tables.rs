@@ -1,10 +1,8 @@
 //! The tables of error motion turn by turn: what to draw of synchronous and asynchronous error motion.
 
+use runout_evaluate::error_motion::{ErrorMotion, Spectrum, TurnsPlot};
 use runout_table::{ArrayRef, ColumnSpec, Figure, Measure, TableSpec, counts, numbers, numbers_or_null, stretches};
-use runout_turning::{
-    error_motion::{ErrorMotion, Spectrum, TurnsPlot},
-    station::StationResult,
-};
+use runout_turning::station::StationResult;
 
 /// Angles of a polar plot, and orders of a spectrum: more are not visible, and would make a result of many stations large.
 const ANGLES: usize = 360;

@@ -9,6 +9,7 @@ use super::{
 };
 use crate::summary::{StationSummary, Summary, misfits};
 use runout_consistency::{self as consistency, Check, Test};
+use runout_evaluate::EvaluatedStation;
 use runout_turning::{
     mains::{self, Sampled},
     profile::Profile,
@@ -101,9 +102,10 @@ pub(super) struct DeclaredStations {
 
 impl DeclaredStations {
     /// Takes a station as the rig is declared.
-    pub(super) fn take(&mut self, result: &StationResult, rig: &Rig) {
+    pub(super) fn take(&mut self, station: &EvaluatedStation, rig: &Rig) {
+        let result = &station.result;
         self.interrupted |= result.separation.sections.iter().any(|section| !section.gaps.is_empty());
-        self.stations.push(summarise(result, Some(rig)));
+        self.stations.push(summarise(station, Some(rig)));
         let checks = &result.separation.residual.checks;
         self.checks.extend(checks.iter().map(|check| check.clone().within(&result.station)));
         self.turns.take(result, rig);

@@ -3,9 +3,10 @@
 use std::path::PathBuf;
 
 use super::Overview;
-use crate::{atomic_file::PendingFile, height_grid::HeightGrid, summary::Summary};
+use crate::{atomic_file::PendingFile, summary::Summary};
 use runout_closed_loop::diagnosis::Diagnosis;
 use runout_error::Result;
+use runout_evaluate::height_grid::HeightGrid;
 use runout_table::{RecordBatch, TableSpec};
 use runout_turning::surface::Surface;
 

@@ -1,7 +1,6 @@
 //! The stages of a pipeline: one trait a file. A plugin implements one of them.
 
 mod check;
-mod evaluable;
 mod exporter;
 mod loader;
 mod overview;
@@ -12,7 +11,6 @@ mod separator;
 mod simulator;
 
 pub use check::{Check, Planned, captures_sampled, speeds_of};
-pub use evaluable::{AxisMotion, Evaluable, EvaluableKind, Form, MotionErrors, OpenProfile, PlaneMap};
 pub use exporter::{About, Completed, Export, Exporter, ResultInfo, Takes};
 pub use loader::{Loader, Request, Source, SourceKind};
 pub use overview::{Overview, Part, Section};
@@ -22,5 +20,6 @@ pub use points::{
     separate_declared,
 };
 pub use preprocessor::{AverageRequest, Averager, Conditioner, Preprocessor, sample_rate_hz};
+pub use runout_evaluate::evaluable::{AxisMotion, Evaluable, EvaluableKind, Form, MotionErrors, OpenProfile, PlaneMap};
 pub use separator::{Separator, Station, StationDiagnosis, StationModel, StationSeparator, require_rig};
 pub use simulator::{Simulation, Simulator};

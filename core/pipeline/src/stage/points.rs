@@ -1,9 +1,6 @@
 //! Separation of measured points, of any domain: points in; tables, values and form out.
 
-use super::{
-    evaluable::{Evaluable, EvaluableKind, Form},
-    plan::PointPlan,
-};
+use super::{Evaluable, EvaluableKind, Form, plan::PointPlan};
 use crate::{
     points::{PointColumn, Points},
     summary::NamedValue,

@@ -1,7 +1,7 @@
 //! Simulation: what would be measured, computed from a declared truth.
 
-use crate::height_grid::HeightGrid;
 use runout_error::Result;
+use runout_evaluate::height_grid::HeightGrid;
 use runout_table::{RecordBatch, TableSpec};
 use runout_turning::{measurement::Recording, rig::Rig};
 

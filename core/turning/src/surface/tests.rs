@@ -36,8 +36,6 @@ fn station(name: &str, sections: &[(&str, f64, &[Complex64])], variance: f64) ->
             warnings: Vec::new(),
         },
         profiles: Vec::new(),
-        values: Vec::new(),
-        motion_values: Vec::new(),
         truth: None,
     }
 }

@@ -151,8 +151,6 @@ fn station() -> StationResult {
             warnings: Vec::new(),
         },
         profiles: Vec::new(),
-        values: Vec::new(),
-        motion_values: Vec::new(),
         truth: None,
     }
 }

@@ -8,6 +8,7 @@ use runout_core::{
         closed_loop::Settings,
         diagnosis::{Added, Diagnosis},
     },
+    points::Points,
     stage::{Outcome, PointDiagnosis, PointSeparator},
 };
 use runout_fly_cutting::{FlyCutting, FlyCuttingConfig, simulate::FlyCuttingScenario};
@@ -32,12 +33,12 @@ pub(crate) fn separator(text: &str) -> FlyCutting {
 }
 
 pub(crate) fn run(grid: HeightGrid, separator: &FlyCutting) -> Outcome {
-    separator.separate(&grid.points("map.h5".into())).unwrap()
+    separator.separate(&Points::of_grid(grid, "map.h5".into())).unwrap()
 }
 
 pub(crate) fn diagnose(grid: HeightGrid, separator: &FlyCutting) -> PointDiagnosis {
     let settings = Settings { max_added: 40, ..Settings::default() };
-    separator.model().unwrap().diagnose(&grid.points("map.h5".into()), &settings).unwrap()
+    separator.model().unwrap().diagnose(&Points::of_grid(grid, "map.h5".into()), &settings).unwrap()
 }
 
 pub(crate) fn value(outcome: &Outcome, symbol: &str, of: Option<&str>) -> f64 {

@@ -1,6 +1,6 @@
 //! Fly-cut surfaces drawn by chance.
 
-use runout_core::{Error, Result};
+use runout_core::{Error, Result, points::Points};
 use runout_fly_cutting::{
     FlyCuttingConfig,
     simulate::{CutConfig, Direction, FlyCuttingScenario, GridConfig, SimulatedEffect},
@@ -76,7 +76,7 @@ fn draw(kind: Kind, turn: usize, chance: &mut Chance) -> Result<Campaign> {
         max_frequency_ratio: 10,
     };
     let separator = config.separator().map_err(|fault| Error::new("check", "the cut", fault))?;
-    let points = scenario.heights()?.points("drawn".into());
+    let points = Points::of_grid(scenario.heights()?, "drawn".into());
     Ok(Campaign {
         layout: layout.name,
         points,

@@ -4,9 +4,10 @@ use super::{
     estimates::{Estimates, Scatter},
     report::{Difference, DifferenceOrders, Harmonics, MethodValue, QuantityComparison, Worst},
 };
-use crate::pipeline::result::true_error;
+use crate::pipeline::true_error::true_error;
+use runout_evaluate::EvaluatedStation;
 use runout_numerics::Complex64;
-use runout_turning::{separation::Quantity, station::StationResult};
+use runout_turning::separation::Quantity;
 
 /// Below this share of the methods' own values, and of their own uncertainties, two results are equal to rounding.
 const ROUNDING: f64 = 1e-9;
@@ -22,7 +23,7 @@ const NO_SCATTER: f64 = 1e-12;
 /// Every unknown of any method, the first method's first.
 pub(super) fn quantities(
     names: &[String],
-    results: &[StationResult],
+    stations: &[EvaluatedStation],
     estimates: Vec<Estimates>,
     scatter: &Scatter,
 ) -> Vec<QuantityComparison> {
@@ -52,11 +53,11 @@ pub(super) fn quantities(
     let compare = |quantity: Quantity| QuantityComparison {
         quantity: quantity.id().to_owned(),
         section: quantity.section().and_then(|section| {
-            results.iter().find_map(|result| Some(result.separation.sections.get(section)?.id.clone()))
+            stations.iter().find_map(|station| Some(station.result.separation.sections.get(section)?.id.clone()))
         }),
         unit: quantity.unit().to_owned(),
-        values: (names.iter().zip(results).zip(&estimates))
-            .filter_map(|((name, result), one)| value(name, quantity, result, one))
+        values: (names.iter().zip(stations).zip(&estimates))
+            .filter_map(|((name, station), one)| value(name, quantity, station, one))
             .collect(),
         differences: (names.iter().zip(&estimates))
             .skip(1)
@@ -80,7 +81,7 @@ fn rms(squares: f64) -> f64 {
     (0.5 * squares).sqrt()
 }
 
-fn value(name: &str, quantity: Quantity, result: &StationResult, one: &Estimates) -> Option<MethodValue> {
+fn value(name: &str, quantity: Quantity, station: &EvaluatedStation, one: &Estimates) -> Option<MethodValue> {
     let unknown = one.position(quantity)?;
     let section = match quantity {
         Quantity::Form(section) => Some(section),
@@ -89,7 +90,7 @@ fn value(name: &str, quantity: Quantity, result: &StationResult, one: &Estimates
     let observable: Vec<Option<(Complex64, f64)>> =
         (1..=one.max_order()).map(|order| one.observable_value(order, unknown)).collect();
     let counted = || observable.iter().skip(first_order(quantity) - 1).flatten();
-    let ront = |section: usize| result.values.get(section)?.iter().find(|value| value.symbol == "RONt");
+    let result = &station.result;
     Some(MethodValue {
         method: name.to_owned(),
         z_mm: match quantity {
@@ -100,7 +101,7 @@ fn value(name: &str, quantity: Quantity, result: &StationResult, one: &Estimates
         },
         rms: rms(counted().map(|(value, _)| value.norm_sqr()).sum()),
         std: known(rms(counted().map(|(_, variance)| variance).sum())),
-        ront_um: section.and_then(ront).map(|value| value.value),
+        ront_um: section.and_then(|section| station.ront(section)).map(|value| value.value),
         truth_rms_error_um: section.and_then(|_| true_error(result, quantity)),
         lost_orders: (1..).zip(&observable).filter(|(_, one)| one.is_none()).map(|(order, _)| order).collect(),
         harmonics: Harmonics {

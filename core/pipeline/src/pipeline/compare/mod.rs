@@ -13,6 +13,7 @@ mod points;
 mod report;
 
 use runout_error::fault::Fault;
+use runout_evaluate::{Evaluate, EvaluatedStation};
 use std::{
     num::NonZeroUsize,
     path::{Path, PathBuf},
@@ -28,11 +29,9 @@ pub use report::{
 use super::{
     Pipeline, Registry,
     config::{Route, exports::spare_inputs},
-    evaluate::Evaluate,
     observer::Observer,
     record_reader::{RecordReader, separate},
     registry::Context,
-    result::{Evaluation, complete},
     warnings::of_station,
 };
 use crate::{
@@ -41,6 +40,7 @@ use crate::{
 };
 use estimates::{Estimates, Scatter};
 use runout_error::{Error, Result};
+use runout_turning::station::StationResult;
 use runout_turning::{
     measurement::StationTruth,
     provenance::{Provenance, VERSION},
@@ -167,12 +167,7 @@ impl<'a> Comparing<'a> {
         let scatter = Scatter::of(station);
         let separators = std::iter::once(self.reference).chain(self.methods.iter().map(|method| &*method.separator));
         let angles = station.profiles.first().map_or(0, |profile| profile.samples_per_rev);
-        let evaluation = Evaluation {
-            evaluate: &Evaluate::ront(),
-            radius_mm: self.rig.part_radius_mm,
-            rig: Some(self.rig),
-            stations: 1,
-        };
+        let ront = Evaluate::ront();
         let mut results = Vec::new();
         let mut estimates = Vec::new();
         let mut warnings: Vec<String> =
@@ -182,8 +177,9 @@ impl<'a> Comparing<'a> {
             warnings.extend(separation.warnings.iter().map(|warning| format!("{name}: {warning}")));
             estimates.push(Estimates::new(&separation, separator.sensitivity(station)?));
             // Profiles are shared; the standards' values need none.
-            let name = station.name.clone();
-            results.push(complete(name, station.z_mm, angles, separation, Vec::new(), truth.cloned(), evaluation));
+            let (name, z_mm, profiles) = (station.name.clone(), station.z_mm, Vec::new());
+            let result = StationResult { station: name, z_mm, angles, separation, profiles, truth: truth.cloned() };
+            results.push(EvaluatedStation::of(result, &ront, self.rig.part_radius_mm, Some(self.rig), 1));
         }
         Ok(StationComparison {
             station: station.name.clone(),

@@ -5,6 +5,7 @@
 
 use runout_consistency::refuted_by;
 use runout_error::fault::Fault;
+use runout_evaluate::Evaluated;
 use std::{collections::BTreeSet, path::PathBuf};
 
 use super::{
@@ -17,7 +18,6 @@ use crate::{
         Pipeline, Registry,
         config::{Route, exports::spare_inputs},
         document::{Document, Sources},
-        evaluate::Evaluated,
         registry::Context,
         warnings::of_station,
     },
@@ -176,7 +176,7 @@ fn normalised(difference: f64, stds: [Option<f64>; 2]) -> Option<f64> {
 
 /// Every value that any method gives, in the order of the first that gives it.
 fn values(outcomes: &[(&str, &Outcome)]) -> Vec<ValueComparison> {
-    let same = NamedValue::is_same_quantity;
+    let same = |one: &NamedValue, other: &NamedValue| one.id() == other.id();
     let mut kinds: Vec<&NamedValue> = Vec::new();
     for value in outcomes.iter().flat_map(|(_, outcome)| &outcome.values) {
         if !kinds.iter().any(|known| same(known, value)) {

@@ -7,11 +7,11 @@ use super::diagnose::DiagnoseConfig;
 use crate::{
     pipeline::{
         document::inline,
-        evaluate::EvaluateConfig,
         registry::{Catalogue, Plugin, Registry},
     },
     summary::Limit,
 };
+use runout_evaluate::EvaluateConfig;
 use runout_turning::{rig::RigConfig, surface::SurfaceConfig};
 
 /// A table of a pipeline that names no plugin.

@@ -7,7 +7,7 @@ use runout_closed_loop::diagnosis::Correction;
 use runout_consistency::Check;
 use runout_draws::Uncertainty;
 use runout_error::Result;
-use runout_standards::Value;
+use runout_evaluate::Value;
 use runout_table::{
     ArrayRef, ColumnSpec, TableRows, TableSpec, counts, counts_or_null, flags, numbers, numbers_or_null, texts,
     texts_or_null,

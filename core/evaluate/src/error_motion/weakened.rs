@@ -1,0 +1,74 @@
+//! Error motion values behind a low-pass.
+
+use crate::Value;
+use runout_draws::stands_out;
+use runout_turning::separation::Separation;
+
+/// The values with their bands ending where filters before the averages pass half of the power, at `half_power_upr`. Where motion stands
+/// out from its noise from half of that on, values of repeating motion say that it is weakened.
+#[must_use]
+pub fn behind_low_pass(mut values: Vec<Value>, separation: &Separation, half_power_upr: f64) -> Vec<Value> {
+    let weakened = has_motion_above(separation, 0.5 * half_power_upr);
+    for value in &mut values {
+        if 0.5 * half_power_upr >= value.band_upr[1] as f64 {
+            continue;
+        }
+        let repeats = !value.symbol.starts_with("asynchronous");
+        value.weakened_above_upr = (weakened && repeats).then_some(half_power_upr);
+        value.band_upr[1] = value.band_upr[1].min(half_power_upr as usize).max(value.band_upr[0]);
+    }
+    values
+}
+
+/// Whether a motion stands out from its noise above an order.
+fn has_motion_above(separation: &Separation, order_upr: f64) -> bool {
+    let motions = separation.unknowns.iter().enumerate().filter(|(_, quantity)| !quantity.is_form());
+    motions.into_iter().any(|(unknown, _)| {
+        let harmonics = separation.coefficients(unknown).zip(separation.noise_variance(unknown)).enumerate();
+        harmonics
+            .skip(1)
+            .any(|(order, (harmonic, variance))| order as f64 > order_upr && stands_out(harmonic, variance))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::error_motion::tests::separation;
+    use runout_numerics::Complex64;
+
+    /// Motion of order 20 behind a low-pass at order 11: what is left of it proves nothing.
+    #[test]
+    fn motion_above_a_low_pass_is_said_to_be_weakened() {
+        let value = |symbol: &str| Value {
+            symbol: symbol.into(),
+            unit: "um".into(),
+            value: 1.0,
+            source: String::new(),
+            band_upr: [2, 63],
+            lost_orders: Vec::new(),
+            weakened_above_upr: None,
+            absent_above_upr: None,
+            no_uncertainty: None,
+            filter: "none".into(),
+            reference: "LSC".into(),
+            coverage: 1.0,
+            uncertainty: None,
+            raised_by_noise: None,
+            refuted_by: None,
+        };
+        let of = |order: usize| {
+            let separation = Separation {
+                variance: vec![1e-8; 4 * 21],
+                ..separation(&[(order, [Complex64::from(0.02), Complex64::ZERO, Complex64::ZERO, Complex64::ZERO])])
+            };
+            let values = vec![value("synchronous-radial-x"), value("asynchronous-radial-x")];
+            behind_low_pass(values, &separation, 10.8)
+                .into_iter()
+                .map(|value| (value.band_upr, value.weakened_above_upr))
+        };
+        assert!(of(20).eq([([2, 10], Some(10.8)), ([2, 10], None)]));
+        assert!(of(8).eq([([2, 10], Some(10.8)), ([2, 10], None)]));
+        assert!(of(3).eq([([2, 10], None), ([2, 10], None)]));
+    }
+}

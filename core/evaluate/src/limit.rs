@@ -1,0 +1,179 @@
+//! `[[limit]]`: what values have to keep, and what was found of them.
+
+use crate::value::{PlacedValue, Value};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// `[[limit]]`: a limit of every value that it names. What it leaves open (section, reference, filter) it does not narrow: all
+/// values of the symbol have to keep it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[non_exhaustive]
+pub struct Limit {
+    /// The standard's symbol: "RONt", "CYLt", "Ra".
+    pub symbol: String,
+    /// Id of a section; all without it.
+    pub section: Option<String>,
+    /// What the value is referred to: "LSCI", "MZCI", "LSCY"; all without it.
+    pub reference: Option<String>,
+    /// The filter as values name it: "none", "Gaussian 50 UPR"; all without it.
+    pub filter: Option<String>,
+    /// The smallest value that may be, in `unit`.
+    pub lower: Option<f64>,
+    /// The largest value that may be, in `unit`.
+    pub upper: Option<f64>,
+    /// Unit of the limits, which is the value's: "um".
+    pub unit: String,
+}
+
+/// What can be said of a value and a limit (ISO 14253-1:2017).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Decision {
+    /// Conformity is proven: the whole 95 % interval keeps the limits.
+    Conforms,
+    /// Non-conformity is proven: the whole interval lies beyond a limit.
+    DoesNotConform,
+    /// Neither is proven: the interval holds a limit, there is no uncertainty to decide with, or something of the value's band
+    /// is not in it.
+    Undecided,
+}
+
+/// A limit and what was found.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[non_exhaustive]
+pub struct LimitSummary {
+    /// The limit.
+    pub limit: Limit,
+    /// Of all values together: proven to conform when each of them is, proven not to when one is; undecided without a value.
+    pub decision: Decision,
+    /// Every value that it names.
+    pub values: Vec<LimitValue>,
+}
+
+/// One value under a limit.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct LimitValue {
+    /// The station; null for a value of the whole part.
+    pub station: Option<String>,
+    /// The section; null for a value of a station or the whole part.
+    pub section: Option<String>,
+    /// What it is referred to.
+    pub reference: String,
+    /// Its filter.
+    pub filter: String,
+    /// Undulations per revolution that it is of, both ends included: what is said of a value without filter is said of
+    /// these.
+    #[serde(default)]
+    pub band_upr: [usize; 2],
+    /// The number.
+    pub value: f64,
+    /// Where the truth lies with 95 % probability; null where that is not known.
+    pub interval_95: Option<[f64; 2]>,
+    /// Whether the number itself keeps the limits.
+    pub within: bool,
+    /// What that proves.
+    pub decision: Decision,
+    /// Why nothing is proven: what of its band is not in the value, or why no uncertainty is stated; null otherwise.
+    #[serde(default)]
+    pub missing: Option<String>,
+}
+
+impl Limit {
+    /// "RONt of section a ≤ 5 um".
+    #[must_use]
+    pub fn name(&self) -> String {
+        let end = |sign: &str, end: Option<f64>| end.map(|end| format!("{sign} {end}")).unwrap_or_default();
+        let ends = [end("≥", self.lower), end("≤", self.upper)];
+        let ends: Vec<&str> = ends.iter().map(String::as_str).filter(|end| !end.is_empty()).collect();
+        let of =
+            |word: &str, what: &Option<String>| what.as_ref().map(|what| format!(" {word}{what}")).unwrap_or_default();
+        let (reference, section) = (of("", &self.reference), of("of section ", &self.section));
+        let filter = of("filter ", &self.filter);
+        format!("{}{reference}{filter}{section} {} {}", self.symbol, ends.join(" and "), self.unit)
+    }
+
+    /// Whether it is one of the value of this symbol, section, reference and filter.
+    #[must_use]
+    pub fn names(&self, symbol: &str, section: Option<&str>, reference: &str, filter: &str) -> bool {
+        // "LSCY" is also "LSCY of centred sections".
+        let referred = self.reference.as_ref().is_none_or(|asked| {
+            reference.strip_prefix(asked.as_str()).is_some_and(|rest| rest.is_empty() || rest.starts_with(" of "))
+        });
+        let here = self.section.as_ref().is_none_or(|asked| section == Some(asked.as_str()));
+        let filtered = self.filter.as_ref().is_none_or(|asked| asked == filter);
+        symbol == self.symbol && here && referred && filtered
+    }
+}
+
+impl Limit {
+    fn decide(&self, placed: &PlacedValue) -> LimitValue {
+        let value = placed.value;
+        let [low, high] = [self.lower.unwrap_or(f64::NEG_INFINITY), self.upper.unwrap_or(f64::INFINITY)];
+        let interval_95 = value.uncertainty.as_ref().map(|uncertainty| uncertainty.interval_95);
+        let refuted = value.refuted_by.as_ref().map(|by| format!("its own data refute the value: {by}"));
+        let missing = refuted.or_else(|| missing(value));
+        let decision = match interval_95 {
+            _ if missing.is_some() => Decision::Undecided,
+            Some([from, to]) if from >= low && to <= high => Decision::Conforms,
+            Some([from, to]) if to < low || from > high => Decision::DoesNotConform,
+            _ => Decision::Undecided,
+        };
+        LimitValue {
+            station: placed.station.map(str::to_owned),
+            section: placed.section.map(str::to_owned),
+            reference: value.reference.clone(),
+            filter: value.filter.clone(),
+            band_upr: value.band_upr,
+            value: value.value,
+            interval_95,
+            within: value.value >= low && value.value <= high,
+            decision,
+            missing: missing.or_else(|| value.no_uncertainty.clone()),
+        }
+    }
+}
+
+/// What of a value's band is not in it.
+fn missing(value: &Value) -> Option<String> {
+    if let [first, others @ ..] = &value.lost_orders[..] {
+        let of_band = match others.len() {
+            0 => "of its band is".to_owned(),
+            more => format!("and {more} more of its band are"),
+        };
+        return Some(format!("order {first} {of_band} not observable"));
+    }
+    if let Some(order) = value.absent_above_upr {
+        return Some(format!(
+            "its filter passes more than a thousandth above order {order}, the highest that there is"
+        ));
+    }
+    let above = value.weakened_above_upr?;
+    Some(format!("of its band, a low-pass has weakened what is above {above:.1} undulations"))
+}
+
+/// Holds all values against all limits. Besides, what the user should know: limits that name no value.
+pub fn decide(limits: &[Limit], all: &[PlacedValue]) -> (Vec<LimitSummary>, Vec<String>) {
+    let mut remarks = Vec::new();
+    let decide = |limit: &Limit| {
+        let named = all.iter().filter(|PlacedValue { section, value, .. }| {
+            limit.names(&value.symbol, *section, &value.reference, &value.filter)
+        });
+        let values: Vec<LimitValue> = named.map(|placed| limit.decide(placed)).collect();
+        if values.is_empty() {
+            let mut symbols: Vec<&str> = all.iter().map(|placed| &*placed.value.symbol).collect();
+            symbols.sort_unstable();
+            symbols.dedup();
+            remarks.push(format!("limit {} names no value; there are {}", limit.name(), symbols.join(", ")));
+        }
+        let any = |decision| values.iter().any(|value| value.decision == decision);
+        let decision = match () {
+            () if any(Decision::DoesNotConform) => Decision::DoesNotConform,
+            () if any(Decision::Undecided) || values.is_empty() => Decision::Undecided,
+            () => Decision::Conforms,
+        };
+        LimitSummary { limit: limit.clone(), decision, values }
+    };
+    let decided = limits.iter().map(decide).collect();
+    (decided, remarks)
+}

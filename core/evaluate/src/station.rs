@@ -1,0 +1,89 @@
+//! One station with all of its values, finished in one place.
+
+use crate::{
+    Evaluate, Value,
+    error_motion::{Centre, ErrorMotion, behind_low_pass, with_jitter_of_marks},
+    section::{missing_circles, section_values, steepest_um_per_deg},
+};
+use runout_consistency::refuted_by;
+use runout_turning::{rig::Rig, separation::Quantity, station::StationResult};
+
+/// What was separated, and the standards' values of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EvaluatedStation {
+    /// Form and motion.
+    pub result: StationResult,
+    /// Values of the form, section by section.
+    pub values: Vec<Vec<Value>>,
+    /// Error motion values of the axis; empty where no spread over the turns is known.
+    pub motion_values: Vec<Value>,
+}
+
+impl EvaluatedStation {
+    /// Evaluates a station of a part of this nominal radius, one of so many that are tested alike. A rig declares interruptions.
+    #[must_use]
+    pub fn of(
+        mut result: StationResult,
+        evaluate: &Evaluate,
+        radius_mm: f64,
+        rig: Option<&Rig>,
+        stations: usize,
+    ) -> Self {
+        if let Some(rig) = rig {
+            let beyond_rad = result.profiles.iter().map(|profile| profile.bridged_beyond_rad).fold(0.0, f64::max);
+            for section in &mut result.separation.sections {
+                section.declared_gaps = rig.gaps_of(&section.id);
+                section.gaps = section.declared_gaps.widened(beyond_rad);
+            }
+        }
+        let sections = 0..result.separation.sections.len();
+        let mut values: Vec<Vec<Value>> =
+            sections.clone().map(|section| section_values(&result, section, evaluate, radius_mm)).collect();
+        let mut motion_values = error_motion_values(&result, &evaluate.centres, radius_mm);
+        let missing = |section: usize| missing_circles(&result, section, evaluate, radius_mm, &values[section]);
+        let missing: Vec<String> = sections.flat_map(missing).collect();
+        result.separation.warnings.extend(missing);
+        judge_among(&mut result, rig, stations);
+        if let Some(by) = refuted_by(&result.separation.residual.checks) {
+            let all = values.iter_mut().flatten().chain(&mut motion_values);
+            all.for_each(|value| value.refuted_by = Some(by.clone()));
+        }
+        Self { result, values, motion_values }
+    }
+
+    /// The first RONt of a section.
+    #[must_use]
+    pub fn ront(&self, section: usize) -> Option<&Value> {
+        self.values.get(section)?.iter().find(|value| value.symbol == "RONt")
+    }
+}
+
+/// The tests of the station's readings and of the course of its turns, as one of several stations and captures.
+fn judge_among(result: &mut StationResult, rig: Option<&Rig>, stations: usize) {
+    let checks = &mut result.separation.residual.checks;
+    for check in checks.iter_mut() {
+        *check = check.clone().among(stations);
+    }
+    for profile in &result.profiles {
+        let setup = rig.and_then(|rig| rig.setups.get(profile.setup)).map_or("", |setup| setup.id.as_str());
+        checks.extend(profile.course.checks.iter().map(|check| check.clone().within(setup)));
+    }
+}
+
+fn error_motion_values(result: &StationResult, centres: &[Centre], radius_mm: f64) -> Vec<Value> {
+    let StationResult { station, z_mm, angles, separation, profiles, .. } = result;
+    if profiles.iter().all(|profile| profile.spread.is_none()) {
+        return Vec::new();
+    }
+    // A face's slope around the axis is none of the circumference.
+    let circle = |(_, quantity): &(usize, &Quantity)| matches!(quantity, Quantity::Form(_));
+    let forms = separation.unknowns.iter().enumerate().filter(circle);
+    let steepest = forms.map(|(unknown, _)| steepest_um_per_deg(&result.over_angle(unknown))).fold(0.0, f64::max);
+    let slope = steepest.to_degrees() / (1e3 * radius_mm);
+    let values = ErrorMotion { station, z_mm: *z_mm, angles: *angles, separation, profiles, slope }.values(centres);
+    let values = with_jitter_of_marks(values, profiles);
+    match result.half_power_upr() {
+        Some(half_power_upr) => behind_low_pass(values, separation, half_power_upr),
+        None => values,
+    }
+}
