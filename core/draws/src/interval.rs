@@ -9,36 +9,46 @@ const TAIL: f64 = 0.02;
 #[derive(Debug, Clone)]
 pub(crate) struct Sides {
     missed: Vec<f64>,
+    again: Vec<f64>,
     lowest: f64,
 }
 
 impl Default for Sides {
     fn default() -> Self {
-        Self { missed: Vec::new(), lowest: f64::INFINITY }
+        Self { missed: Vec::new(), again: Vec::new(), lowest: f64::INFINITY }
     }
 }
 
 impl Sides {
     pub(crate) fn add(&mut self, truth: f64, again: f64) {
         self.missed.push(again - truth);
+        self.again.push(again);
         self.lowest = self.lowest.min(truth).min(again);
     }
 
     /// What is missed in the lowest, in half, and in the highest of all draws.
     fn quantiles(&mut self) -> Option<[f64; 3]> {
-        if self.missed.is_empty() || self.missed.iter().any(|missed| !missed.is_finite()) {
-            return None;
-        }
-        self.missed.sort_by(f64::total_cmp);
-        let count = self.missed.len();
-        let at = |share: f64| {
-            let place = (share * (count as f64 + 1.0) - 1.0).clamp(0.0, (count - 1) as f64);
-            let below = place.floor() as usize;
-            let next = self.missed[(below + 1).min(count - 1)];
-            self.missed[below] + place.fract() * (next - self.missed[below])
-        };
-        Some([at(TAIL), at(0.5), at(1.0 - TAIL)])
+        let is_known = !self.missed.is_empty() && self.missed.iter().all(|missed| missed.is_finite());
+        is_known.then(|| {
+            self.missed.sort_by(f64::total_cmp);
+            [TAIL, 0.5, 1.0 - TAIL].map(|share| at(&self.missed, share))
+        })
     }
+
+    /// The highest value of the draws measured again.
+    fn highest(&mut self) -> f64 {
+        self.again.sort_by(f64::total_cmp);
+        at(&self.again, 1.0 - TAIL)
+    }
+}
+
+/// Value at a share of sorted ones.
+fn at(sorted: &[f64], share: f64) -> f64 {
+    let count = sorted.len();
+    let place = (share * (count as f64 + 1.0) - 1.0).clamp(0.0, (count - 1) as f64);
+    let below = place.floor() as usize;
+    let next = sorted[(below + 1).min(count - 1)];
+    sorted[below] + place.fract() * (next - sorted[below])
 }
 
 /// What is known of one value.
@@ -53,19 +63,23 @@ pub struct Interval {
 }
 
 impl Interval {
-    pub(crate) fn of(found: f64, processed: f64, sides: [Sides; 2]) -> Self {
+    /// Where the data refute the noise as too large, the truth may be as large as what was found with all of that noise.
+    pub(crate) fn of(found: f64, processed: f64, mut sides: [Sides; 2], refutes_noise: bool) -> Self {
         let lowest = sides.iter().map(|sides| sides.lowest).fold(f64::INFINITY, f64::min);
         let draws = sides.iter().map(|sides| sides.missed.len()).sum();
-        let mut missed = sides.map(|mut sides| sides.quantiles());
-        let (Some(least), Some(most)) = (missed[0].take(), missed[1].take()) else {
+        let [of_least, of_most] = &mut sides;
+        let (Some(least), Some(most)) = (of_least.quantiles(), of_most.quantiles()) else {
             return Self { found, uncertainty: None, share_of_noise: f64::NAN };
         };
         if !(found.is_finite() && processed.is_finite()) {
             return Self { found, uncertainty: None, share_of_noise: f64::NAN };
         }
         let floor = if lowest >= 0.0 { 0.0 } else { f64::NEG_INFINITY };
-        let interval_95 =
-            [processed - least[2].max(most[2]), processed - least[0].min(most[0])].map(|end| end.max(floor));
+        let mut high = processed - least[0].min(most[0]);
+        if refutes_noise {
+            high = high.max(of_most.highest());
+        }
+        let interval_95 = [processed - least[2].max(most[2]), high].map(|end| end.max(floor));
         let std = (interval_95[1] - interval_95[0]) / (2.0 * NORMAL_95);
         let share_of_noise = found - processed + 0.5 * (least[1] + most[1]);
         Self { found, uncertainty: Some(Uncertainty { std, interval_95, draws }), share_of_noise }

@@ -212,7 +212,8 @@ impl Profiles<'_> {
             });
         }
         let all = found.into_iter().zip(processed).zip(sides);
-        all.map(|((found, processed), sides)| Interval::of(found, processed, sides)).collect()
+        let refuted = self.draws.sections.iter().any(|section| section.refutes_noise);
+        all.map(|((found, processed), sides)| Interval::of(found, processed, sides, refuted)).collect()
     }
 
     /// The same of values of one whole profile.
@@ -309,11 +310,10 @@ impl Profiles<'_> {
         let seen = if section.marks.all.is_empty() { self.weights.len() } else { section.kept.len() };
         truth.truncate(seen);
         again.truncate(seen);
-        let both = truth.iter_mut().zip(again.iter_mut()).zip(form.spread.iter().zip(&form.noise).zip(wider));
-        for ((truth, again), ((spread, noise), wider)) in both {
-            let noise = noise * wider;
-            *truth *= spread * noise;
-            *again = *truth + *again * noise;
+        let both = truth.iter_mut().zip(again.iter_mut()).zip(form.spread.iter().zip(wider));
+        for ((truth, again), (spread, wider)) in both {
+            *truth *= spread * wider;
+            *again = *truth + *again * *wider;
         }
         let weighted = truth.iter().zip(&self.weights).map(|(noise, weight)| noise * weight);
         fourier.synthesise_into(weighted, &mut of_truth.0);

@@ -25,8 +25,6 @@ const SHOWN: f64 = 9.0;
 const SHOWN_MOST: f64 = 3.0;
 /// The error of an order that has more than this share of all noise does not average out: it is left as it is.
 const LARGE: f64 = 0.2;
-/// Noise of which the data refute the variance as too large may be as much as they allow, and so much of that.
-const OF_REFUTED: f64 = 0.01;
 /// Orders that share one estimate of their variance, at most.
 const TOGETHER: usize = 5;
 
@@ -43,13 +41,11 @@ pub struct Measured {
     pub lowest: usize,
 }
 
-/// A profile that the true one may be: its mean, the share of each order's error by which it is uncertain, and that of the error as stated
-/// which noise has beside it.
+/// A profile that the true one may be: its mean, and the share of each order's error by which it is uncertain.
 #[derive(Debug, Clone)]
 pub(crate) struct Form {
     pub mean: Vec<Complex64>,
     pub spread: Vec<f64>,
-    pub noise: Vec<f64>,
 }
 
 /// A section read twice.
@@ -62,25 +58,23 @@ pub(crate) struct Section {
     pub(crate) kept: Vec<f64>,
     /// The least form, and the most.
     pub(crate) forms: [Form; 2],
+    /// Whether the data have less power than their noise would have.
+    pub(crate) refutes_noise: bool,
 }
 
 impl Section {
     /// One section alone, or one of those of a wall.
     pub(crate) fn of(measured: &Measured, of_wall: bool) -> Self {
         let Measured { harmonics, variance, squares, lowest } = measured;
+        let noise = Noise { variance, squares, lowest: *lowest };
         let (certain, seen) = if of_wall { (CERTAIN_OF_WALL, SEEN_OF_WALL) } else { (CERTAIN.0, SEEN) };
-        let stated = Noise { variance, squares, lowest: *lowest };
-        // The least form is beside the most noise, the most form beside the least.
-        let at_most = Spectrum::of(harmonics, stated).allowed(seen);
-        let at_least: Vec<f64> =
-            at_most.iter().map(|share| if *share < 1.0 { OF_REFUTED * share } else { 1.0 }).collect();
-        let [of_most, of_least] = [&at_most, &at_least]
-            .map(|shares| -> Vec<f64> { variance.iter().zip(shares).map(|(all, share)| all * share).collect() });
-        let [noise, least_noise] = [&of_most, &of_least].map(|variance| Noise { variance, ..stated });
+        if noise.is_refuted_by(harmonics, seen) {
+            return Self::of_any_noise(harmonics);
+        }
         let mut marks = Marks::default();
         marks.find(harmonics, noise, certain, CERTAIN.1);
         let mut with_possible = marks.clone();
-        with_possible.find(harmonics, least_noise, POSSIBLE.0, POSSIBLE.1);
+        with_possible.find(harmonics, noise, POSSIBLE.0, POSSIBLE.1);
         let all: f64 = (0..harmonics.len()).filter_map(|order| noise.of(order)).sum();
         let is_large = |order: usize| noise.of(order).is_some_and(|variance| variance > LARGE * all);
         let whole_where_large = |shares: Vec<f64>| -> Vec<f64> {
@@ -88,17 +82,28 @@ impl Section {
         };
         let rest = marks.without(harmonics);
         let rest_of_most = with_possible.without(harmonics);
-        let least = Spectrum::of(&rest, noise).shares(Power::Least { seen }, SHOWN_LEAST);
-        let most = whole_where_large(Spectrum::of(&rest_of_most, least_noise).shares(Power::Most, SHOWN_MOST));
-        let kept = whole_where_large(Spectrum::of(&rest, least_noise).shares(Power::Most, SHOWN));
-        let form = |rest: &[Complex64], share: Vec<f64>, noise: Vec<f64>| {
+        let spectrum = Spectrum::of(&rest, noise);
+        let least = spectrum.shares(Power::Least { seen }, SHOWN_LEAST);
+        let most = whole_where_large(Spectrum::of(&rest_of_most, noise).shares(Power::Most, SHOWN_MOST));
+        let kept = whole_where_large(spectrum.shares(Power::Most, SHOWN));
+        let form = |rest: &[Complex64], share: Vec<f64>| {
             let beside = |order: usize| harmonics[order] - rest[order];
             let mean = (0..rest.len()).map(|order| beside(order) + share[order] * rest[order]).collect();
-            let spread = share.into_iter().map(f64::sqrt).collect();
-            Form { mean, spread, noise: noise.into_iter().map(f64::sqrt).collect() }
+            Form { mean, spread: share.into_iter().map(f64::sqrt).collect() }
         };
-        let forms = [form(&rest, least, at_most), form(&rest_of_most, most, at_least)];
-        Self { found: harmonics.clone(), marks, kept, forms }
+        let forms = [form(&rest, least), form(&rest_of_most, most)];
+        Self { found: harmonics.clone(), marks, kept, forms, refutes_noise: false }
+    }
+
+    /// What was found may be anything from noise alone to all form, and nothing is taken out of it.
+    fn of_any_noise(found: &[Complex64]) -> Self {
+        let none = vec![0.0; found.len()];
+        let forms = [
+            Form { mean: vec![Complex64::ZERO; found.len()], spread: none.clone() },
+            Form { mean: found.to_vec(), spread: none },
+        ];
+        let (marks, kept) = (Marks::default(), vec![1.0; found.len()]);
+        Self { found: found.to_vec(), marks, kept, forms, refutes_noise: true }
     }
 
     /// What every measured profile is taken for: its certain marks, and of the rest the share that may be form. Noise that raises values is

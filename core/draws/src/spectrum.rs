@@ -94,6 +94,16 @@ impl Noise<'_> {
     fn shared(&self, order: usize) -> f64 {
         if self.squares(order) == 0 { 1.0 } else { 1.0 + 2.0 * SHARING / self.squares(order) as f64 }
     }
+
+    /// Whether a profile has less power in all orders together than its noise alone would have beyond this quantile: then its variance is stated
+    /// too large.
+    pub(crate) fn is_refuted_by(&self, harmonics: &[Complex64], quantile: f64) -> bool {
+        let known = || (0..harmonics.len()).filter_map(|order| Some((order, self.of(order)?)));
+        let all: f64 = known().map(|(_, variance)| variance).sum();
+        let spread: f64 = known().map(|(order, variance)| variance * variance * self.shared(order)).sum();
+        let power: f64 = known().map(|(order, _)| harmonics[order].norm_sqr()).sum();
+        power < all * of_mean_square(all * all / spread, -quantile)
+    }
 }
 
 /// The spectrum of one profile.
@@ -175,15 +185,6 @@ impl<'a> Spectrum<'a> {
         };
         let level = if power == Power::Middle { 1.0 } else { of_mean_square(self.with_waves[order], quantile) };
         if is_seen { (total / level - of_noise).max(0.0) } else { 0.0 }
-    }
-
-    /// Share of each variance that noise has at most: below 1 where noise alone would have more power beyond this quantile.
-    pub(crate) fn allowed(&self, quantile: f64) -> Vec<f64> {
-        let share = |order: usize| {
-            let fewest = self.of_noise[order] * of_mean_square(self.without_waves[order], -quantile);
-            if self.total[order] < fewest { self.total[order] / fewest } else { 1.0 }
-        };
-        (0..self.power.len()).map(share).collect()
     }
 
     /// Share of each order that is form: by the power of waves, or by its own where that is above noise by a chance of e^−`shown`. All of

@@ -153,6 +153,7 @@ fn missing(value: &Value) -> Option<String> {
 }
 
 /// Holds all values against all limits. Besides, what the user should know: limits that name no value.
+#[must_use]
 pub fn decide(limits: &[Limit], all: &[PlacedValue]) -> (Vec<LimitSummary>, Vec<String>) {
     let mut remarks = Vec::new();
     let decide = |limit: &Limit| {

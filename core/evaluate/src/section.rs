@@ -13,6 +13,7 @@ use runout_turning::{
 };
 
 /// The values of a section whose nominal radius is known.
+#[must_use]
 pub fn section_values(result: &StationResult, section: usize, evaluate: &Evaluate, radius_mm: f64) -> Vec<Value> {
     let Some(form) = Form::of(result, section, radius_mm) else { return Vec::new() };
     let mut values = form.values(evaluate);

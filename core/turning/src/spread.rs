@@ -161,6 +161,7 @@ impl Projection {
 
 /// What a unit of each tilt adds to motion along the axis at a place of the face, µm/µrad: −ρ·(ε_y cos θ − ε_x sin θ). Where tilt
 /// is known towards one line only, that of places on the line.
+#[must_use]
 pub fn face_shares(place: FacePlace, line: Option<Azimuth>) -> Vec<(Quantity, f64)> {
     let (sine, cosine) = place.radians().sin_cos();
     let lever = place.radius_mm() * UM_PER_MM_URAD;

@@ -30,6 +30,7 @@ impl Evaluate {
     }
 
     /// Symbols and units of the values that may come.
+    #[must_use]
     pub fn symbols(&self) -> Vec<(String, &'static str)> {
         let mut symbols: Vec<(&'static str, &'static str)> = Vec::new();
         if self.has(Group::Roundness) {
