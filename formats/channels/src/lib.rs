@@ -1,0 +1,35 @@
+//! Recordings of named channels, as other programs write them: one loader, `channels`, for many formats.
+//!
+//! A format is a module that recognises a file by its first bytes and gives its channels and their samples in blocks
+//! ([`ChannelFile`]). Everything else is done once for all formats: which channel is which sensor, setups and stations by groups or
+//! files, units, marks, encoders and sampling rates.
+//!
+//! ```
+//! use runout_channels::{FORMATS, Kind};
+//!
+//! assert!(FORMATS.iter().any(|format| format.name == "tdms"));
+//! assert_eq!(Kind::I16.codes(), Some([-32768.0, 32767.0]));
+//! ```
+
+mod bytes;
+mod capture;
+mod channel;
+mod config;
+mod formats;
+mod recording;
+mod select;
+mod strided;
+mod suggest;
+mod turns;
+mod unit;
+
+pub use channel::{Channel, ChannelFile, Kind, Samples};
+pub use config::{AngleConfig, ChannelConfig, ChannelsConfig, ConvertedConfig, MarkConfig};
+pub use formats::{FORMATS, Format, format_of, open};
+pub use suggest::{ChannelReport, ChannelsReport, inspect};
+use runout_core::pipeline::{Plugin, Registry};
+
+/// Adds the loader `channels`.
+pub fn register(registry: &mut Registry) {
+    registry.loaders.add(Plugin::of::<ChannelsConfig>());
+}

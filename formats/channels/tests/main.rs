@@ -1,0 +1,7 @@
+//! The formats of named channels: against their reference libraries, and all by one suite.
+#![allow(clippy::unwrap_used, reason = "tests")]
+
+mod conformance;
+mod mutations;
+mod references;
+mod support;
