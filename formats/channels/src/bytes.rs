@@ -2,10 +2,12 @@
 
 use std::{
     fs::File,
-    io::{BufReader, Read, Seek, SeekFrom},
+    io::{BufRead, BufReader, Read, Seek, SeekFrom},
 };
 
-use runout_core::{Error, ErrorKind, Result, input_file::InputFile};
+use runout_core::{Error, ErrorKind, Result};
+
+use crate::source::Source;
 
 /// Longest text or piece that is taken into memory as a whole.
 pub(crate) const LONGEST: u64 = 1 << 24;
@@ -20,10 +22,9 @@ pub(crate) struct Bytes {
 }
 
 impl Bytes {
-    pub(crate) fn open(input: &InputFile) -> Result<Self> {
-        let file = BufReader::with_capacity(1 << 14, input.open()?);
-        let shown = input.path().display().to_string();
-        Ok(Self { file, shown, length: input.bytes(), place: 0, is_big_endian: false })
+    pub(crate) fn open(source: &Source) -> Result<Self> {
+        let file = BufReader::with_capacity(1 << 14, source.open()?);
+        Ok(Self { file, shown: source.shown(), length: source.bytes(), place: 0, is_big_endian: false })
     }
 
     /// The file's length.
@@ -82,6 +83,24 @@ impl Bytes {
         self.file.read_exact(&mut bytes).map_err(|error| Error::caused("read", &self.shown, error))?;
         self.place += count;
         Ok(bytes)
+    }
+
+    /// The next line without its end; nothing at the end of the file. A longer line is given in pieces.
+    pub(crate) fn line(&mut self, longest: usize) -> Result<Option<Vec<u8>>> {
+        let mut line = Vec::new();
+        let read = Read::by_ref(&mut self.file).take(longest as u64).read_until(b'\n', &mut line);
+        read.map_err(|error| Error::caused("read", &self.shown, error))?;
+        self.place += line.len() as u64;
+        if line.is_empty() {
+            return Ok(None);
+        }
+        if line.last() == Some(&b'\n') {
+            line.pop();
+        }
+        if line.last() == Some(&b'\r') {
+            line.pop();
+        }
+        Ok(Some(line))
     }
 
     pub(crate) fn u8(&mut self) -> Result<u8> {

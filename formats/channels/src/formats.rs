@@ -1,13 +1,19 @@
 //! The formats: the one list. A format is a module that recognises a file by its first bytes and opens it as channels.
 
+mod hdf5;
+mod mat;
+mod npy;
+mod npz;
 mod tdms;
+mod text;
+mod uff;
 mod wav;
 
 use std::io::Read;
 
 use runout_core::{Error, ErrorKind, Result, input_file::InputFile};
 
-use crate::channel::ChannelFile;
+use crate::{channel::ChannelFile, hints};
 
 /// A format of files.
 pub struct Format {
@@ -22,7 +28,7 @@ pub struct Format {
 }
 
 /// Every format, in the order in which they are asked.
-pub const FORMATS: [Format; 2] = [tdms::FORMAT, wav::FORMAT];
+pub const FORMATS: [Format; 8] = [tdms::FORMAT, mat::FORMAT, hdf5::FORMAT, npy::FORMAT, npz::FORMAT, uff::FORMAT, wav::FORMAT, text::FORMAT];
 
 /// First bytes that formats look at.
 const HEAD: u64 = 4096;
@@ -57,5 +63,5 @@ pub fn format_of(input: &InputFile, name: Option<&str>) -> Result<&'static Forma
 /// # Errors
 /// When it cannot be read, is of no known format, or is damaged.
 pub fn open(input: &InputFile, format: Option<&str>) -> Result<Box<dyn ChannelFile>> {
-    (format_of(input, format)?.open)(input)
+    (format_of(input, format)?.open)(input).map(hints::hinted)
 }

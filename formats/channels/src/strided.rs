@@ -6,9 +6,12 @@ use std::{
     sync::Arc,
 };
 
-use runout_core::{Error, ErrorKind, Result, input_file::InputFile};
+use runout_core::{Error, ErrorKind, Result};
 
-use crate::channel::{Kind, Samples};
+use crate::{
+    channel::{Kind, Samples},
+    source::Source,
+};
 
 /// Bytes that are read at a time.
 const WINDOW: usize = 1 << 18;
@@ -28,7 +31,6 @@ pub(crate) struct Run {
 
 impl Run {
     /// Numbers side by side.
-    #[allow(dead_code)]
     pub(crate) fn dense(offset: u64, count: u64, kind: Kind, is_big_endian: bool) -> Self {
         Self::spaced(offset, count, kind.bytes() as u64, kind, is_big_endian)
     }
@@ -71,7 +73,7 @@ pub(crate) struct Column {
 
 /// Reads channels whose numbers lie at equal distances.
 pub(crate) struct StridedSamples {
-    source: Source,
+    source: Windows,
     columns: Vec<Cursor>,
 }
 
@@ -86,11 +88,11 @@ struct Cursor {
 }
 
 /// A file, seen through windows.
-struct Source {
+struct Windows {
     file: File,
     shown: String,
     bytes: u64,
-    windows: Vec<Window>,
+    views: Vec<Window>,
 }
 
 #[derive(Default)]
@@ -100,7 +102,7 @@ struct Window {
 }
 
 impl StridedSamples {
-    pub(crate) fn open(input: &InputFile, columns: Vec<Column>) -> Result<Self> {
+    pub(crate) fn open(source: &Source, columns: Vec<Column>) -> Result<Self> {
         let mut cursors: Vec<Cursor> = Vec::with_capacity(columns.len());
         let mut firsts: Vec<Run> = Vec::new();
         for column in columns {
@@ -119,9 +121,9 @@ impl StridedSamples {
             };
             cursors.push(Cursor { column, window, run: 0, repeat: 0, index: 0 });
         }
-        let windows = (0..firsts.len().max(1)).map(|_| Window::default()).collect();
-        let (file, shown) = (input.open()?, input.path().display().to_string());
-        Ok(Self { source: Source { file, shown, bytes: input.bytes(), windows }, columns: cursors })
+        let views = (0..firsts.len().max(1)).map(|_| Window::default()).collect();
+        let source = Windows { file: source.open()?, shown: source.shown(), bytes: source.bytes(), views };
+        Ok(Self { source, columns: cursors })
     }
 }
 
@@ -156,7 +158,7 @@ impl StridedSamples {
 }
 
 impl Cursor {
-    fn take(&mut self, source: &mut Source, most: usize, to: &mut Vec<f64>) -> Result<usize> {
+    fn take(&mut self, source: &mut Windows, most: usize, to: &mut Vec<f64>) -> Result<usize> {
         let first = to.len();
         while to.len() - first < most {
             let Some(run) = self.column.runs.get(self.run).copied() else { break };
@@ -179,7 +181,7 @@ impl Cursor {
     }
 }
 
-impl Source {
+impl Windows {
     /// Appends up to `wanted` numbers of a run that begins at `start`, from number `index` on; at least one.
     fn numbers(
         &mut self,
@@ -206,7 +208,7 @@ impl Source {
 
     /// Bytes of the file, through a window; `ahead` reads on behind them.
     fn bytes(&mut self, window: usize, place: u64, length: usize, ahead: bool) -> Result<&[u8]> {
-        let Window { start, bytes } = &mut self.windows[window];
+        let Window { start, bytes } = &mut self.views[window];
         let is_inside = place >= *start && place.saturating_add(length as u64) <= *start + bytes.len() as u64;
         if !is_inside {
             let rest = self.bytes.saturating_sub(place);

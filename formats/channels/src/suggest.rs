@@ -64,7 +64,7 @@ enum Turning {
 pub fn inspect(path: &Path) -> Result<Option<ChannelsReport>> {
     let input = InputFile::new(path)?;
     let Ok(format) = formats::format_of(&input, None) else { return Ok(None) };
-    let file: Arc<dyn ChannelFile> = (format.open)(&input)?.into();
+    let file: Arc<dyn ChannelFile> = formats::open(&input, Some(format.name))?.into();
     let mut channels = Vec::with_capacity(file.channels().len());
     let mut turning: Vec<Option<Turning>> = Vec::new();
     for (index, channel) in file.channels().iter().enumerate() {

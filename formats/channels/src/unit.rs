@@ -46,6 +46,20 @@ pub(crate) fn known(text: &str) -> Option<Known> {
     })
 }
 
+/// A name and the unit behind it: `Displ X1 [µm]`, `X1 (mm)`, `t / s`; the name as it is where there is none.
+pub(crate) fn split(name: &str) -> (String, Option<String>) {
+    let name = name.trim();
+    let bracketed = [('[', ']'), ('(', ')')].into_iter().find_map(|(open, close)| {
+        let (before, unit) = name.strip_suffix(close)?.rsplit_once(open)?;
+        Some((before, unit))
+    });
+    let slashed = || name.rsplit_once('/').filter(|(_, unit)| known(unit).is_some());
+    match bracketed.filter(|(_, unit)| known(unit).is_some()).or_else(slashed) {
+        Some((before, unit)) if !before.trim().is_empty() => (before.trim().to_owned(), Some(unit.trim().to_owned())),
+        _ => (name.to_owned(), None),
+    }
+}
+
 /// What the numbers of a unit are multiplied by for the unit of the rig's sensor.
 ///
 /// # Errors

@@ -3,5 +3,6 @@
 
 mod conformance;
 mod mutations;
+mod real_files;
 mod references;
 mod support;

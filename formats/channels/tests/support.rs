@@ -48,5 +48,5 @@ pub(crate) fn bits(values: &[f64]) -> Vec<u64> {
 
 /// Whether an asset is text, whose end does not say that it is one.
 pub(crate) fn is_text(path: &Path) -> bool {
-    path.extension().is_some_and(|end| ["csv", "lvm", "txt"].iter().any(|text| end == *text))
+    path.extension().is_some_and(|end| ["csv", "lvm", "txt", "uff"].iter().any(|text| end == *text))
 }

@@ -48,7 +48,7 @@ struct Layout {
 
 impl Wav {
     fn open(input: &InputFile) -> Result<Self> {
-        let mut bytes = Bytes::open(input)?;
+        let mut bytes = Bytes::open(&input.into())?;
         let riff = bytes.array::<4>()?;
         bytes.is_big_endian = riff == *b"RIFX";
         bytes.skip(8)?;
@@ -169,7 +169,7 @@ impl ChannelFile for Wav {
         let scaling = self.scaling.map(|scaling| Arc::new(scaling) as _);
         let column = |channel: &usize| Column { runs: vec![self.runs[*channel]], scaling: scaling.clone() };
         let columns = channels.iter().map(column).collect();
-        Ok(Box::new(StridedSamples::open(&self.input, columns)?))
+        Ok(Box::new(StridedSamples::open(&(&self.input).into(), columns)?))
     }
 
     fn remarks(&self) -> Vec<String> {

@@ -96,7 +96,7 @@ impl ChannelFile for Tdms {
             let Data { runs, scaling } = &self.data[*channel];
             Column { runs: runs.clone(), scaling: scaling.clone().map(|chain| Arc::new(chain) as _) }
         };
-        Ok(Box::new(StridedSamples::open(&self.input, channels.iter().map(column).collect())?))
+        Ok(Box::new(StridedSamples::open(&(&self.input).into(), channels.iter().map(column).collect())?))
     }
 
     fn remarks(&self) -> Vec<String> {

@@ -80,7 +80,7 @@ impl Segments {
     pub(super) fn read(input: &InputFile) -> Result<Self> {
         let mut all =
             Self { objects: Vec::new(), remarks: Vec::new(), by_path: HashMap::new(), list: Vec::new(), has_list: false };
-        let mut bytes = Bytes::open(input)?;
+        let mut bytes = Bytes::open(&input.into())?;
         let shown = input.path().display();
         while bytes.rest() > 0 {
             let begin = bytes.place();
