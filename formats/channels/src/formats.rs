@@ -1,5 +1,6 @@
 //! The formats: the one list. A format is a module that recognises a file by its first bytes and opens it as channels.
 
+mod arrow;
 mod hdf5;
 mod mat;
 mod npy;
@@ -28,7 +29,7 @@ pub struct Format {
 }
 
 /// Every format, in the order in which they are asked.
-pub const FORMATS: [Format; 8] = [tdms::FORMAT, mat::FORMAT, hdf5::FORMAT, npy::FORMAT, npz::FORMAT, uff::FORMAT, wav::FORMAT, text::FORMAT];
+pub const FORMATS: [Format; 10] = [tdms::FORMAT, mat::FORMAT, hdf5::FORMAT, npy::FORMAT, npz::FORMAT, arrow::PARQUET, arrow::FORMAT, uff::FORMAT, wav::FORMAT, text::FORMAT];
 
 /// First bytes that formats look at.
 const HEAD: u64 = 4096;
