@@ -1,22 +1,19 @@
 //! One capture: which channels of which files it is made of.
 
-use std::{
-    path::{Path, PathBuf},
-    sync::{Arc, Mutex, PoisonError},
-};
+use std::{path::PathBuf, sync::Arc};
 
 use runout_core::{
     Error, ErrorKind, Result,
     clock::ClockScan,
-    input_file::InputFile,
     measurement::StationKey,
     rig::{Rig, Unit},
 };
 
 use crate::{
-    channel::{Channel, ChannelFile, Samples},
+    channel::{Channel, ChannelFile},
     config::{ChannelConfig, ChannelsConfig},
-    formats, select, unit,
+    files::Files,
+    select, unit,
 };
 
 /// Sampling rates that differ by a smaller share are the same: rounding of a time column.
@@ -26,8 +23,20 @@ const SAME_INSTANT: f64 = 0.01;
 /// Samples that are read at a time.
 pub(crate) const BLOCK: usize = 1 << 13;
 /// Names of channels that hold the times of the samples.
-const TIMES: [&str; 12] =
-    ["time", "time_s", "t", "t_s", "times", "timestamp", "timestamps", "zeit", "x_value", "x-axis", "elapsed", "elapsed_s"];
+const TIMES: [&str; 12] = [
+    "time",
+    "time_s",
+    "t",
+    "t_s",
+    "times",
+    "timestamp",
+    "timestamps",
+    "zeit",
+    "x_value",
+    "x-axis",
+    "elapsed",
+    "elapsed_s",
+];
 
 /// A file and one of its channels.
 #[derive(Clone)]
@@ -117,7 +126,7 @@ impl Place<'_> {
     pub(crate) fn path(&self, channel: &str) -> PathBuf {
         match (&self.config.path, &self.config.pattern) {
             (Some(path), _) => path.clone(),
-            (None, pattern) => self.files.folder.join(self.expanded(pattern.as_deref().unwrap_or_default(), channel)),
+            (None, pattern) => self.files.folder().join(self.expanded(pattern.as_deref().unwrap_or_default(), channel)),
         }
     }
 
@@ -160,7 +169,8 @@ impl Place<'_> {
         let index = match found {
             Err(_) if of_a_channel && file.channels().len() == 1 => 0,
             found => found.map_err(|problem| {
-                let help = "name the channels by `channels` in [load]; `runout inspect FILE` prints a table to start from";
+                let help =
+                    "name the channels by `channels` in [load]; `runout inspect FILE` prints a table to start from";
                 Error::new("read", &shown, problem).help(help)
             })?,
         };
@@ -196,7 +206,8 @@ impl Place<'_> {
         let samples = lengths().min().unwrap_or(0);
         if let Some((longer, _)) = sensors.iter().find(|(signal, _)| signal.channel().samples > samples) {
             let more = longer.channel().samples - samples;
-            remarks.push(format!("{}: its last {more} samples are not used: another channel ends before", longer.shown));
+            remarks
+                .push(format!("{}: its last {more} samples are not used: another channel ends before", longer.shown));
         }
         if samples == 0 {
             let shown = sensors.first().map_or_else(String::new, |(signal, _)| signal.shown.clone());
@@ -213,7 +224,12 @@ impl Place<'_> {
     }
 
     /// From the numbers of the file to those of the sensor, and whether a unit says so.
-    fn conversion(&self, signal: &Signal, configured: Option<&ChannelConfig>, sensor: Unit) -> Result<(Conversion, bool)> {
+    fn conversion(
+        &self,
+        signal: &Signal,
+        configured: Option<&ChannelConfig>,
+        sensor: Unit,
+    ) -> Result<(Conversion, bool)> {
         let of_file = signal.channel().unit.as_deref();
         let stated = self.config.unit.as_deref();
         let failed = |problem: String| signal.error(problem).help(unit::HELP);
@@ -299,7 +315,9 @@ impl Place<'_> {
 fn time_beside(beside: &Signal) -> Option<Signal> {
     let channels = beside.file.channels();
     let own = beside.channel();
-    let index = channels.iter().position(|channel| is_time(channel) && channel.group == own.group && channel.samples == own.samples)?;
+    let index = channels
+        .iter()
+        .position(|channel| is_time(channel) && channel.group == own.group && channel.samples == own.samples)?;
     let shown = beside.shown.replace(&own.path(), &channels[index].path());
     Some(Signal { file: Arc::clone(&beside.file), index, shown })
 }
@@ -307,7 +325,8 @@ fn time_beside(beside: &Signal) -> Option<Signal> {
 /// Whether a channel is named like one of times.
 pub(crate) fn is_time(channel: &Channel) -> bool {
     let is_named = TIMES.contains(&channel.name.to_lowercase().as_str());
-    let is_seconds = channel.unit.as_deref().and_then(unit::known).is_none_or(|unit| matches!(unit, unit::Known::Seconds(_)));
+    let is_seconds =
+        channel.unit.as_deref().and_then(unit::known).is_none_or(|unit| matches!(unit, unit::Known::Seconds(_)));
     channel.kind.is_number() && is_named && is_seconds
 }
 
@@ -324,96 +343,4 @@ fn same_start(sensors: &[(Signal, Conversion)], rate_hz: Option<f64>) -> Result<
         }
     }
     Ok(at_s)
-}
-
-/// The files that were opened.
-pub(crate) struct Files {
-    folder: PathBuf,
-    /// As they were when they were first opened.
-    inputs: Mutex<Vec<InputFile>>,
-    last: Mutex<Option<(PathBuf, Arc<dyn ChannelFile>)>>,
-}
-
-impl Files {
-    pub(crate) fn new(folder: &Path) -> Self {
-        Self { folder: folder.to_owned(), inputs: Mutex::default(), last: Mutex::default() }
-    }
-
-    /// Opens a file; the last one is kept.
-    fn open(&self, path: &Path, format: Option<&str>) -> Result<Arc<dyn ChannelFile>> {
-        let mut last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((known, file)) = &*last
-            && known == path
-        {
-            return Ok(Arc::clone(file));
-        }
-        let input = {
-            let mut inputs = self.inputs.lock().unwrap_or_else(PoisonError::into_inner);
-            let known = inputs.iter().find(|input| input.path() == path).cloned();
-            if let Some(input) = known {
-                input
-            } else {
-                let input = InputFile::new(path)?;
-                inputs.push(input.clone());
-                input
-            }
-        };
-        let file: Arc<dyn ChannelFile> = formats::open(&input, format)?.into();
-        *last = Some((path.to_owned(), Arc::clone(&file)));
-        Ok(file)
-    }
-
-    pub(crate) fn inputs(&self) -> Vec<InputFile> {
-        self.inputs.lock().unwrap_or_else(PoisonError::into_inner).clone()
-    }
-}
-
-/// Reads the signals of one capture side by side.
-pub(crate) struct Readers {
-    parts: Vec<Part>,
-}
-
-/// What is read of one file.
-struct Part {
-    samples: Box<dyn Samples>,
-    /// Which of the signals.
-    signals: Vec<usize>,
-    columns: Vec<Vec<f64>>,
-}
-
-impl Readers {
-    pub(crate) fn open(signals: &[(Signal, Conversion)]) -> Result<Self> {
-        let mut parts: Vec<(&Signal, Vec<usize>)> = Vec::new();
-        for (number, (signal, _)) in signals.iter().enumerate() {
-            match parts.iter_mut().find(|(other, _)| Arc::ptr_eq(&other.file, &signal.file)) {
-                Some((_, numbers)) => numbers.push(number),
-                None => parts.push((signal, vec![number])),
-            }
-        }
-        let open = |(signal, numbers): (&Signal, Vec<usize>)| {
-            let channels: Vec<usize> = numbers.iter().map(|number| signals[*number].0.index).collect();
-            let samples = signal.file.read(&channels)?;
-            Ok(Part { samples, columns: vec![Vec::new(); numbers.len()], signals: numbers })
-        };
-        Ok(Self { parts: parts.into_iter().map(open).collect::<Result<_>>()? })
-    }
-
-    /// Hands on up to `most` samples of each signal: its number and they.
-    pub(crate) fn next(&mut self, most: usize, mut take: impl FnMut(usize, &[f64])) -> Result<()> {
-        for Part { samples, signals, columns } in &mut self.parts {
-            columns.iter_mut().for_each(Vec::clear);
-            // A reader may give fewer at a time.
-            let mut left = most;
-            while left > 0 {
-                match samples.next(left, columns)? {
-                    0 => break,
-                    taken => left = left.saturating_sub(taken),
-                }
-            }
-            for (signal, column) in signals.iter().zip(&*columns) {
-                take(*signal, column);
-            }
-        }
-        Ok(())
-    }
 }

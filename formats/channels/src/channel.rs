@@ -171,3 +171,20 @@ pub(crate) fn checked<'a>(shown: &str, all: &'a [Channel], wanted: &[usize]) -> 
     };
     wanted.iter().map(of).collect()
 }
+
+/// Readers of one channel each.
+pub(crate) struct SideBySide(pub(crate) Vec<Box<dyn Samples>>);
+
+impl Samples for SideBySide {
+    fn next(&mut self, most: usize, columns: &mut [Vec<f64>]) -> Result<usize> {
+        let mut longest = 0;
+        for (samples, column) in self.0.iter_mut().zip(columns) {
+            let before = column.len();
+            while column.len() - before < most
+                && samples.next(most - (column.len() - before), std::slice::from_mut(column))? > 0
+            {}
+            longest = longest.max(column.len() - before);
+        }
+        Ok(longest)
+    }
+}

@@ -194,7 +194,9 @@ impl ChannelsConfig {
             return Err(Fault::at("speed_rpm", format!("expected a number above 0, found {speed_rpm}")));
         }
         if let Some(unit) = self.unit.as_ref().filter(|unit| !is_reading(unit)) {
-            return Err(Fault::at("unit", format!("expected a unit of length or voltage, found `{unit}`")).help(unit::HELP));
+            return Err(
+                Fault::at("unit", format!("expected a unit of length or voltage, found `{unit}`")).help(unit::HELP)
+            );
         }
         if self.pulses_per_turn == Some(0) {
             return Err(Fault::at("pulses_per_turn", "expected a number above 0, found 0"));
@@ -215,7 +217,9 @@ impl ChannelsConfig {
             if let ChannelConfig::Converted(converted) = channel {
                 let ConvertedConfig { gain, offset, unit, .. } = converted;
                 if !(gain.is_finite() && *gain != 0.0 && offset.is_finite()) {
-                    return Err(fault(format!("expected a finite gain other than 0 and offset, found {gain} and {offset}")));
+                    return Err(fault(format!(
+                        "expected a finite gain other than 0 and offset, found {gain} and {offset}"
+                    )));
                 }
                 if let Some(unit) = unit.as_ref().filter(|unit| !is_reading(unit)) {
                     return Err(fault(format!("expected a unit of length or voltage, found `{unit}`")).help(unit::HELP));
@@ -226,10 +230,14 @@ impl ChannelsConfig {
     }
 
     fn check_turns(&self, rig: Option<&Rig>) -> std::result::Result<(), Fault> {
-        let stated = [("marker", self.marker.is_some()), ("angle", self.angle.is_some()), ("times", self.times.is_some())];
+        let stated =
+            [("marker", self.marker.is_some()), ("angle", self.angle.is_some()), ("times", self.times.is_some())];
         let stated: Vec<&str> = stated.iter().filter(|(_, is_stated)| *is_stated).map(|(name, _)| *name).collect();
         if let [first, second, ..] = stated[..] {
-            return Err(Fault::at(second, format!("expected one way to know the turns, found `{first}` and `{second}`")));
+            return Err(Fault::at(
+                second,
+                format!("expected one way to know the turns, found `{first}` and `{second}`"),
+            ));
         }
         for (key, mark) in [("marker", &self.marker), ("zero", &self.zero)] {
             let Some(mark) = mark else { continue };
@@ -259,12 +267,18 @@ impl ChannelsConfig {
         }
         let by_pulses = self.pulses_per_turn.is_some() && self.angle.is_none();
         if self.zero.is_some() && !by_pulses {
-            return Err(Fault::at("zero", "a mark of the zero belongs to the pulses of an encoder: add `pulses_per_turn`"));
+            return Err(Fault::at(
+                "zero",
+                "a mark of the zero belongs to the pulses of an encoder: add `pulses_per_turn`",
+            ));
         }
         let is_alone = rig.is_none_or(|rig| rig.setups.len() == 1) && self.stations.len() < 2;
         if by_pulses && self.zero.is_none() && !is_alone {
-            let message = "pulses of an encoder do not say where the angle is 0, which setups and stations have to share";
-            return Err(Fault::at("pulses_per_turn", message).help("name the channel of the once-per-turn mark by `zero`"));
+            let message =
+                "pulses of an encoder do not say where the angle is 0, which setups and stations have to share";
+            return Err(
+                Fault::at("pulses_per_turn", message).help("name the channel of the once-per-turn mark by `zero`")
+            );
         }
         Ok(())
     }

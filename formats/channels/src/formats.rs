@@ -29,7 +29,18 @@ pub struct Format {
 }
 
 /// Every format, in the order in which they are asked.
-pub const FORMATS: [Format; 10] = [tdms::FORMAT, mat::FORMAT, hdf5::FORMAT, npy::FORMAT, npz::FORMAT, arrow::PARQUET, arrow::FORMAT, uff::FORMAT, wav::FORMAT, text::FORMAT];
+pub const FORMATS: [Format; 10] = [
+    tdms::FORMAT,
+    mat::FORMAT,
+    hdf5::FORMAT,
+    npy::FORMAT,
+    npz::FORMAT,
+    arrow::PARQUET,
+    arrow::FORMAT,
+    uff::FORMAT,
+    wav::FORMAT,
+    text::FORMAT,
+];
 
 /// First bytes that formats look at.
 const HEAD: u64 = 4096;

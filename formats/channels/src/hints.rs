@@ -6,11 +6,21 @@ use crate::channel::{Channel, ChannelFile, Kind, Samples};
 
 /// Names of variables that hold a sampling rate in Hz.
 const RATES: [&str; 11] = [
-    "fs", "fs_hz", "sample_rate", "samplerate", "sample_rate_hz", "sampling_rate", "samplingrate", "sampling_rate_hz", "rate",
-    "rate_hz", "sampling_frequency",
+    "fs",
+    "fs_hz",
+    "sample_rate",
+    "samplerate",
+    "sample_rate_hz",
+    "sampling_rate",
+    "samplingrate",
+    "sampling_rate_hz",
+    "rate",
+    "rate_hz",
+    "sampling_frequency",
 ];
 /// Names of variables that hold the time from sample to sample in s.
-const STEPS: [&str; 8] = ["dt", "dt_s", "delta_t", "tinterval", "interval", "sample_interval", "sampling_interval", "wf_increment"];
+const STEPS: [&str; 8] =
+    ["dt", "dt_s", "delta_t", "tinterval", "interval", "sample_interval", "sampling_interval", "wf_increment"];
 /// Names of variables that hold a unit.
 const UNITS: [&str; 3] = ["unit", "units", "einheit"];
 /// Under which property the text of a variable is.
@@ -25,7 +35,8 @@ struct Hinted {
 /// Gives channels without a rate or unit that of a variable in their group, or in one above it.
 pub(crate) fn hinted(file: Box<dyn ChannelFile>) -> Box<dyn ChannelFile> {
     let lacks = |channel: &Channel| channel.samples > 1 && (channel.rate_hz.is_none() || channel.unit.is_none());
-    let hints: Vec<Hint> = file.channels().iter().enumerate().filter_map(|(index, channel)| Hint::of(&*file, index, channel)).collect();
+    let hints: Vec<Hint> =
+        file.channels().iter().enumerate().filter_map(|(index, channel)| Hint::of(&*file, index, channel)).collect();
     if hints.is_empty() || !file.channels().iter().any(lacks) {
         return file;
     }

@@ -15,6 +15,7 @@ mod bytes;
 mod capture;
 mod channel;
 mod config;
+mod files;
 mod formats;
 mod hints;
 mod lines;
@@ -29,8 +30,8 @@ mod unit;
 pub use channel::{Channel, ChannelFile, Kind, Samples};
 pub use config::{AngleConfig, ChannelConfig, ChannelsConfig, ConvertedConfig, MarkConfig};
 pub use formats::{FORMATS, Format, format_of, open};
-pub use suggest::{ChannelReport, ChannelsReport, inspect};
 use runout_core::pipeline::{Plugin, Registry};
+pub use suggest::{ChannelReport, ChannelsReport, inspect};
 
 /// Adds the loader `channels`.
 pub fn register(registry: &mut Registry) {

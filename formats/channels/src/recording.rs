@@ -10,8 +10,9 @@ use runout_core::{
 };
 
 use crate::{
-    capture::{Conversion, Files, Place, Readers, Signal, Signals},
+    capture::{Conversion, Place, Signal, Signals},
     config::ChannelsConfig,
+    files::{Files, Readers},
     turns::{AngleReader, Angles, Pulses, Turns},
 };
 

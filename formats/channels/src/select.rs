@@ -50,12 +50,19 @@ pub(crate) fn find(channels: &[Channel], group: &str, name: &str) -> Result<usiz
 }
 
 fn several(name: &str, paths: &[&str]) -> String {
-    format!("`{name}` is the name of several channels: {}; name the group too, or name the groups by `setups`", paths.join(", "))
+    format!(
+        "`{name}` is the name of several channels: {}; name the group too, or name the groups by `setups`",
+        paths.join(", ")
+    )
 }
 
 /// A path with one kind of separators and without blanks, which do not distinguish channels: `a.b[:, 3]` is `a/b[:,3]`.
 fn plain(path: &str) -> String {
-    path.trim_start_matches('/').chars().filter(|character| *character != ' ').map(|character| if character == '.' { '/' } else { character }).collect()
+    path.trim_start_matches('/')
+        .chars()
+        .filter(|character| *character != ' ')
+        .map(|character| if character == '.' { '/' } else { character })
+        .collect()
 }
 
 #[cfg(test)]
@@ -70,7 +77,8 @@ mod tests {
 
     #[test]
     fn names_are_found_below_their_group() {
-        let all = channels(&[("Run 0", "X1"), ("Run 0", "Displ. X2"), ("Run 1", "X1"), ("s/deep", "y[:,1]"), ("", "X1")]);
+        let all =
+            channels(&[("Run 0", "X1"), ("Run 0", "Displ. X2"), ("Run 1", "X1"), ("s/deep", "y[:,1]"), ("", "X1")]);
         assert_eq!(find(&all, "Run 1", "X1"), Ok(2));
         assert_eq!(find(&all, "", "Run 0/X1"), Ok(0));
         assert_eq!(find(&all, "", "X1"), Ok(4));

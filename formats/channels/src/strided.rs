@@ -240,7 +240,8 @@ fn append(run: &Run, bytes: &[u8], count: usize, to: &mut Vec<f64>) {
             const WIDTH: usize = size_of::<$type>();
             let of = |bytes: &[u8]| bytes.first_chunk::<WIDTH>().copied().unwrap_or_default();
             let convert = |bytes: [u8; WIDTH]| {
-                let number = if run.is_big_endian { <$type>::from_be_bytes(bytes) } else { <$type>::from_le_bytes(bytes) };
+                let number =
+                    if run.is_big_endian { <$type>::from_be_bytes(bytes) } else { <$type>::from_le_bytes(bytes) };
                 $convert(number)
             };
             if run.stride as usize == WIDTH {

@@ -97,7 +97,9 @@ fn best_mark(channels: &[Channel], turning: &[Option<Turning>]) -> Option<(usize
 /// Whether a name is one of marks and encoders.
 fn is_mark(name: &str) -> bool {
     let name = name.to_lowercase();
-    ["index", "mark", "trig", "tach", "key", "once", "enc", "angle", "winkel", "pulse", "z-"].iter().any(|word| name.contains(word))
+    ["index", "mark", "trig", "tach", "key", "once", "enc", "angle", "winkel", "pulse", "z-"]
+        .iter()
+        .any(|word| name.contains(word))
 }
 
 /// How a channel tells the angle, by its name's and unit's hint and its samples.
@@ -105,7 +107,9 @@ fn turning_of(channel: &Channel, values: &[f64]) -> Option<Turning> {
     if values.len() < 16 || values.iter().any(|value| !value.is_finite()) {
         return None;
     }
-    let (low, high) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(*value), high.max(*value)));
+    let (low, high) = values
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(*value), high.max(*value)));
     let range = high - low;
     if range <= 0.0 {
         return None;
@@ -161,16 +165,25 @@ fn table(file: &str, channels: &[Channel], mark: Option<(&Channel, Turning)>) ->
     let names = groups.get(first).cloned().unwrap_or_default();
     let alike: Vec<&str> = order.iter().copied().filter(|group| groups.get(group) == Some(&names)).collect();
     if alike.len() > 1 {
-        let id = |number: usize| SETUPS.get(number).filter(|_| alike.len() == 2).map_or_else(|| format!("setup-{}", number + 1), |id| (*id).to_owned());
-        let entries: Vec<String> =
-            alike.iter().enumerate().map(|(number, group)| format!("{} = {}", key(&id(number)), quoted(group))).collect();
+        let id = |number: usize| {
+            SETUPS
+                .get(number)
+                .filter(|_| alike.len() == 2)
+                .map_or_else(|| format!("setup-{}", number + 1), |id| (*id).to_owned())
+        };
+        let entries: Vec<String> = alike
+            .iter()
+            .enumerate()
+            .map(|(number, group)| format!("{} = {}", key(&id(number)), quoted(group)))
+            .collect();
         let _ = writeln!(text, "setups = {{ {} }}", entries.join(", "));
     }
     let is_unique = |name: &str| sensors.iter().filter(|channel| channel.name == name).count() == 1;
     let path = |name: &str| {
         if alike.len() > 1 || first.is_empty() || is_unique(name) { name.to_owned() } else { format!("{first}/{name}") }
     };
-    let entries: Vec<String> = names.iter().enumerate().map(|(number, name)| format!("S{} = {}", number + 1, quoted(&path(name)))).collect();
+    let entries: Vec<String> =
+        names.iter().enumerate().map(|(number, name)| format!("S{} = {}", number + 1, quoted(&path(name)))).collect();
     let _ = writeln!(text, "channels = {{ {} }}", entries.join(", "));
     match mark {
         Some((mark, Turning::Angle)) => {
@@ -199,7 +212,8 @@ fn table(file: &str, channels: &[Channel], mark: Option<(&Channel, Turning)>) ->
 
 /// A key of TOML.
 fn key(name: &str) -> String {
-    let is_bare = !name.is_empty() && name.bytes().all(|byte| byte.is_ascii_alphanumeric() || matches!(byte, b'_' | b'-'));
+    let is_bare =
+        !name.is_empty() && name.bytes().all(|byte| byte.is_ascii_alphanumeric() || matches!(byte, b'_' | b'-'));
     if is_bare { name.to_owned() } else { quoted(name) }
 }
 

@@ -133,7 +133,10 @@ impl Turns {
         for (number, three) in marks.windows(3).enumerate() {
             let (before, now) = (three[1] - three[0], three[2] - three[1]);
             if !(now < LOST_PULSE * before && before < LOST_PULSE * now) {
-                let problem = format!("expected even pulses, found distances of {before:.2} and {now:.2} samples at pulse {}", number + 1);
+                let problem = format!(
+                    "expected even pulses, found distances of {before:.2} and {now:.2} samples at pulse {}",
+                    number + 1
+                );
                 return Err(Error::new("read", shown(), problem).help("a pulse is missing or there is one too many"));
             }
         }
@@ -356,7 +359,8 @@ fn kept(mut marks: Vec<f64>, signals: &Signals, name: &str) -> Result<Vec<f64>> 
     let range = -1.0..=signals.samples as f64;
     marks.retain(|mark| range.contains(mark));
     if marks.len() < 2 {
-        let problem = format!("expected a mark each turn during its {} samples, found {}", signals.samples, marks.len());
+        let problem =
+            format!("expected a mark each turn during its {} samples, found {}", signals.samples, marks.len());
         return Err(Error::new("read", name, problem));
     }
     Ok(marks)

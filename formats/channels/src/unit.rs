@@ -18,9 +18,8 @@ pub(crate) fn known(text: &str) -> Option<Known> {
     use Known::{Counts, LengthUm, Seconds, Turns, Volts};
     let text = text.trim().trim_matches(['[', ']', '(', ')']).trim();
     Some(match text {
-        "um" | "µm" | "μm" | "micron" | "microns" | "micrometer" | "micrometre" | "Micrometer" | "Micrometers" | "UM" => {
-            LengthUm(1.0)
-        }
+        "um" | "µm" | "μm" | "micron" | "microns" | "micrometer" | "micrometre" | "Micrometer" | "Micrometers"
+        | "UM" => LengthUm(1.0),
         "mm" | "MM" | "millimeter" | "millimetre" | "Millimeter" | "Millimeters" => LengthUm(1e3),
         "nm" | "nanometer" | "nanometre" | "Nanometer" | "Nanometers" => LengthUm(1e-3),
         "pm" => LengthUm(1e-6),
@@ -76,7 +75,9 @@ pub(crate) fn factor(text: &str, sensor: Unit) -> Result<f64, String> {
         (Some(Known::LengthUm(from)), Known::LengthUm(to)) | (Some(Known::Volts(from)), Known::Volts(to)) => {
             Ok(from / to)
         }
-        (Some(Known::Volts(_)), _) => Err(format!("the channel is in {text}, the sensor of the rig in a unit of length")),
+        (Some(Known::Volts(_)), _) => {
+            Err(format!("the channel is in {text}, the sensor of the rig in a unit of length"))
+        }
         (Some(Known::LengthUm(_)), _) => Err(format!("the channel is in {text}, the sensor of the rig in volts")),
         _ => Err(format!("expected a unit of length or voltage, found `{text}`")),
     }

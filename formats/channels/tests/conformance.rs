@@ -94,7 +94,11 @@ fn a_file_cut_at_every_length_gives_an_error_or_its_beginning() {
         }
         // Where a part of the file ends, a whole file may end too.
         let most = if crate::support::is_text(&path) { usize::MAX } else { 8 };
-        assert!(without_words <= most, "{}: of {without_words} lengths readings are missing without a word", path.display());
+        assert!(
+            without_words <= most,
+            "{}: of {without_words} lengths readings are missing without a word",
+            path.display()
+        );
     }
 }
 
@@ -108,7 +112,11 @@ fn an_empty_file_is_of_no_format() {
     assert!(error.advice().unwrap().contains("Lion SEA"), "{error}");
     for format in &FORMATS {
         let opened = (format.open)(&InputFile::new(&path).unwrap());
-        assert!(opened.map_or(true, |file| file.channels().iter().all(|channel| channel.samples == 0)), "{}", format.name);
+        assert!(
+            opened.map_or(true, |file| file.channels().iter().all(|channel| channel.samples == 0)),
+            "{}",
+            format.name
+        );
     }
 }
 

@@ -6,3 +6,4 @@ mod mutations;
 mod real_files;
 mod references;
 mod support;
+mod turns;

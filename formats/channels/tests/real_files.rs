@@ -33,10 +33,23 @@ const FILES: [(&str, &[Expected]); 17] = [
     ("scopes/DS2072A-7.csv", &[("CH2", Some("Volt"), Some(2e5), 1400, 0.016, 0.296)]),
     (
         "uff/Sample_UFF58b_bin.uff",
-        &[("Mic 01.0Scalar/Mic 01", Some("Pa"), Some(65_535.95), 79_292, -0.014_755_260_199_308_395, -0.004_314_688_965_678_215)],
+        &[(
+            "Mic 01.0Scalar/Mic 01",
+            Some("Pa"),
+            Some(65_535.95),
+            79_292,
+            -0.014_755_260_199_308_395,
+            -0.004_314_688_965_678_215,
+        )],
     ),
-    ("uff/sample_dataset58_psd.uff", &[("Power Spectral Density (PSD)/Pilot 1", Some("g²/Hz"), None, 3201, 0.0, 2.634_827e-10)]),
-    ("mat/scipy-big_endian.mat", &[("floats[:, 0]", None, None, 2, 2.0, 3.0), ("floats[:, 1]", None, None, 2, 3.0, 4.0)]),
+    (
+        "uff/sample_dataset58_psd.uff",
+        &[("Power Spectral Density (PSD)/Pilot 1", Some("g²/Hz"), None, 3201, 0.0, 2.634_827e-10)],
+    ),
+    (
+        "mat/scipy-big_endian.mat",
+        &[("floats[:, 0]", None, None, 2, 2.0, 3.0), ("floats[:, 1]", None, None, 2, 3.0, 4.0)],
+    ),
     ("mat/scipy-testmatrix_4.2c_SOL2.mat", &[("testmatrix[0, :]", None, None, 5, 1.0, 5.0)]),
     ("mat/scipy-testcell_7.4_GLNX86.mat", &[("testcell/[3]", None, None, 3, 1.0, 3.0)]),
     ("wav/test-44100Hz-2ch-32bit-float-le.wav", &[("ch1", None, Some(44_100.0), 441, 0.0, 0.509_851_396_083_831_8)]),

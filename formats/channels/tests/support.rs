@@ -16,8 +16,10 @@ pub(crate) fn assets() -> PathBuf {
 /// Every asset that has a list of what its reference library reads, by name.
 pub(crate) fn all_assets() -> Vec<PathBuf> {
     let expected = fs::read_dir(assets()).unwrap().map(|entry| entry.unwrap().path());
-    let mut files: Vec<PathBuf> =
-        expected.filter(|path| path.extension().is_some_and(|end| end == "expected")).map(|path| path.with_extension("")).collect();
+    let mut files: Vec<PathBuf> = expected
+        .filter(|path| path.extension().is_some_and(|end| end == "expected"))
+        .map(|path| path.with_extension(""))
+        .collect();
     files.sort();
     files
 }

@@ -80,7 +80,13 @@ impl ForeignFile {
         Ok(found)
     }
 
-    fn group(&mut self, group: &Group, place: &Place, path: &mut Vec<String>, seen: &mut HashSet<String>) -> Result<()> {
+    fn group(
+        &mut self,
+        group: &Group,
+        place: &Place,
+        path: &mut Vec<String>,
+        seen: &mut HashSet<String>,
+    ) -> Result<()> {
         // A group may be a member of itself.
         let identity = group.loc_info().map_err(|error| place.error(error))?;
         if path.len() > DEEPEST || !seen.insert(format!("{:?} {:?}", identity.fileno, identity.token)) {
@@ -132,7 +138,8 @@ impl ForeignFile {
             Ok(TypeDescriptor::Reference(Reference::Object)) if depth == 0 => return self.cells(&found),
             Ok(TypeDescriptor::Compound(record)) if found.shape.len() == 1 => {
                 let fields = record.fields.iter();
-                found.numbers = fields.filter_map(|field| Some((Some(field.name.clone()), number_name(&field.ty)?))).collect();
+                found.numbers =
+                    fields.filter_map(|field| Some((Some(field.name.clone()), number_name(&field.ty)?))).collect();
             }
             Ok(other) => {
                 let is_text = is_characters
@@ -166,7 +173,10 @@ impl ForeignFile {
             let mut path = cells.path.clone();
             let last = path.pop().unwrap_or_default();
             path.push(format!("{last}[{number}]"));
-            let is_own = cells.place.links().is_none_or(|links| links.is_home_of(&dataset) && links.check_dataset(&dataset).is_ok());
+            let is_own = cells
+                .place
+                .links()
+                .is_none_or(|links| links.is_home_of(&dataset) && links.check_dataset(&dataset).is_ok());
             if is_own && self.datasets.len() < MOST {
                 self.dataset(dataset, cells.place.clone(), &path, 1)?;
             }

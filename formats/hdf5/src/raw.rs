@@ -16,10 +16,10 @@ use hdf5_metno_sys::{
     h5pl::H5PLset_loading_state,
     h5s::{H5S_seloper_t, H5Sclose, H5Screate_simple, H5Sselect_hyperslab},
     h5t::{
-        H5T_NATIVE_DOUBLE, H5T_class_t, H5Tclose, H5Tcreate, H5Tinsert,
-        H5T_IEEE_F32BE, H5T_IEEE_F32LE, H5T_IEEE_F64BE, H5T_IEEE_F64LE, H5T_STD_I8BE, H5T_STD_I8LE, H5T_STD_I16BE,
-        H5T_STD_I16LE, H5T_STD_I32BE, H5T_STD_I32LE, H5T_STD_I64BE, H5T_STD_I64LE, H5T_STD_U8BE, H5T_STD_U8LE,
-        H5T_STD_U16BE, H5T_STD_U16LE, H5T_STD_U32BE, H5T_STD_U32LE, H5T_STD_U64BE, H5T_STD_U64LE, H5Tequal,
+        H5T_IEEE_F32BE, H5T_IEEE_F32LE, H5T_IEEE_F64BE, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, H5T_STD_I8BE, H5T_STD_I8LE,
+        H5T_STD_I16BE, H5T_STD_I16LE, H5T_STD_I32BE, H5T_STD_I32LE, H5T_STD_I64BE, H5T_STD_I64LE, H5T_STD_U8BE,
+        H5T_STD_U8LE, H5T_STD_U16BE, H5T_STD_U16LE, H5T_STD_U32BE, H5T_STD_U32LE, H5T_STD_U64BE, H5T_STD_U64LE,
+        H5T_class_t, H5Tclose, H5Tcreate, H5Tequal, H5Tinsert,
     },
 };
 
@@ -111,8 +111,14 @@ pub(crate) fn read_field(dataset: &Dataset, field: &str, range: Range<usize>) ->
         let mut status = H5Tinsert(record, name.as_ptr(), 0, *H5T_NATIVE_DOUBLE);
         if status >= 0 {
             let chosen = H5S_seloper_t::H5S_SELECT_SET;
-            status =
-                H5Sselect_hyperslab(space.id(), chosen, start.as_ptr(), std::ptr::null(), count.as_ptr(), std::ptr::null());
+            status = H5Sselect_hyperslab(
+                space.id(),
+                chosen,
+                start.as_ptr(),
+                std::ptr::null(),
+                count.as_ptr(),
+                std::ptr::null(),
+            );
         }
         if status >= 0 {
             status = H5Dread(dataset.id(), record, memory, space.id(), H5P_DEFAULT, values.as_mut_ptr().cast());

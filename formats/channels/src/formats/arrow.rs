@@ -8,13 +8,13 @@ use std::{
 };
 
 use arrow_array::{
-    Array, ArrayRef, BooleanArray, Decimal128Array, Decimal256Array, PrimitiveArray, RecordBatch,
+    Array, ArrayRef, BooleanArray, PrimitiveArray, RecordBatch,
     types::{
-        ArrowPrimitiveType, Date32Type, Date64Type, DurationMicrosecondType, DurationMillisecondType,
-        DurationNanosecondType, DurationSecondType, Float16Type, Float32Type, Float64Type, Int8Type, Int16Type, Int32Type,
-        Int64Type, Time32MillisecondType, Time32SecondType, Time64MicrosecondType, Time64NanosecondType,
-        TimestampMicrosecondType, TimestampMillisecondType, TimestampNanosecondType, TimestampSecondType, UInt8Type,
-        UInt16Type, UInt32Type, UInt64Type,
+        ArrowPrimitiveType, Date32Type, Date64Type, Decimal128Type, Decimal256Type, DecimalType,
+        DurationMicrosecondType, DurationMillisecondType, DurationNanosecondType, DurationSecondType, Float16Type,
+        Float32Type, Float64Type, Int8Type, Int16Type, Int32Type, Int64Type, Time32MillisecondType, Time32SecondType,
+        Time64MicrosecondType, Time64NanosecondType, TimestampMicrosecondType, TimestampMillisecondType,
+        TimestampNanosecondType, TimestampSecondType, UInt8Type, UInt16Type, UInt32Type, UInt64Type,
     },
 };
 use arrow_ipc::{reader::StreamReader, root_as_message};
@@ -85,9 +85,16 @@ impl Table {
         let stated = if let Container::Ipc { begin } = container { count(input, begin)? } else { 0 };
         let file = input.open()?;
         let schema = guarded(&shown, || schema(file, container))?;
-        let mut table = Self { input: input.clone(), container, schema: Arc::clone(&schema), channels: Vec::new(), origins: Vec::new() };
+        let mut table = Self {
+            input: input.clone(),
+            container,
+            schema: Arc::clone(&schema),
+            channels: Vec::new(),
+            origins: Vec::new(),
+        };
         let is_instant = |field: &Field| matches!(field.data_type(), DataType::Timestamp(..));
-        let instants: Vec<usize> = (0..schema.fields().len()).filter(|column| is_instant(schema.field(*column))).collect();
+        let instants: Vec<usize> =
+            (0..schema.fields().len()).filter(|column| is_instant(schema.field(*column))).collect();
         table.origins = vec![0; schema.fields().len()];
         let rows = if container == Container::Parquet {
             let file = input.open()?;
@@ -182,7 +189,8 @@ fn count(input: &InputFile, begin: u64) -> Result<u64> {
             return Ok(rows);
         }
         let head = bytes.take(length.into())?;
-        let message = root_as_message(&head).map_err(|error| bytes.damaged(format!("expected a message of Arrow: {error}")))?;
+        let message =
+            root_as_message(&head).map_err(|error| bytes.damaged(format!("expected a message of Arrow: {error}")))?;
         let (body, length) = (bytes.place(), message.bodyLength());
         if length < 0 || length as u64 > bytes.rest() {
             return Err(bytes.damaged(format!("a body of {length} bytes was declared, the file has {}", bytes.rest())));
@@ -235,7 +243,9 @@ impl ChannelFile for Table {
         columns.sort_unstable();
         columns.dedup();
         let place = |channel: &usize| columns.binary_search(channel).unwrap_or(0);
-        let wanted = channels.iter().map(|channel| (place(channel), self.origins[*channel], unit_s(self.schema.field(*channel).data_type())));
+        let wanted = channels
+            .iter()
+            .map(|channel| (place(channel), self.origins[*channel], unit_s(self.schema.field(*channel).data_type())));
         let wanted = wanted.collect();
         Ok(Box::new(BatchSamples { batches: self.batches(&columns, BATCH)?, shown, wanted, batch: None, used: 0 }))
     }
@@ -287,7 +297,12 @@ fn kind_of(stored: &DataType) -> Kind {
         DataType::Float64 => Kind::F64,
         DataType::Boolean => Kind::Bool,
         DataType::Decimal128(..) | DataType::Decimal256(..) => Kind::Decimal,
-        DataType::Timestamp(..) | DataType::Duration(_) | DataType::Time32(_) | DataType::Time64(_) | DataType::Date32 | DataType::Date64 => Kind::Time,
+        DataType::Timestamp(..)
+        | DataType::Duration(_)
+        | DataType::Time32(_)
+        | DataType::Time64(_)
+        | DataType::Date32
+        | DataType::Date64 => Kind::Time,
         DataType::Utf8 | DataType::LargeUtf8 | DataType::Utf8View => Kind::Text,
         DataType::Dictionary(_, value) if matches!(**value, DataType::Utf8 | DataType::LargeUtf8) => Kind::Text,
         _ => Kind::Other,
@@ -297,12 +312,14 @@ fn kind_of(stored: &DataType) -> Kind {
 /// Seconds of the unit of a type; 1 of one without.
 fn unit_s(stored: &DataType) -> f64 {
     match stored {
-        DataType::Timestamp(unit, _) | DataType::Duration(unit) | DataType::Time32(unit) | DataType::Time64(unit) => match unit {
-            TimeUnit::Second => 1.0,
-            TimeUnit::Millisecond => 1e-3,
-            TimeUnit::Microsecond => 1e-6,
-            TimeUnit::Nanosecond => 1e-9,
-        },
+        DataType::Timestamp(unit, _) | DataType::Duration(unit) | DataType::Time32(unit) | DataType::Time64(unit) => {
+            match unit {
+                TimeUnit::Second => 1.0,
+                TimeUnit::Millisecond => 1e-3,
+                TimeUnit::Microsecond => 1e-6,
+                TimeUnit::Nanosecond => 1e-9,
+            }
+        }
         DataType::Date32 => 86_400.0,
         DataType::Date64 => 1e-3,
         _ => 1.0,
@@ -314,6 +331,13 @@ fn append(array: &ArrayRef, origin: i64, unit_s: f64, to: &mut Vec<f64>) {
     fn each<T: ArrowPrimitiveType>(array: &ArrayRef, to: &mut Vec<f64>, convert: impl Fn(T::Native) -> f64) {
         if let Some(array) = array.as_any().downcast_ref::<PrimitiveArray<T>>() {
             to.extend(array.iter().map(|value| value.map_or(f64::NAN, &convert)));
+        }
+    }
+    /// Their text is exact; the number is the nearest to it.
+    fn decimals<T: DecimalType>(array: &ArrayRef, to: &mut Vec<f64>) {
+        if let Some(array) = array.as_any().downcast_ref::<PrimitiveArray<T>>() {
+            let text = |row| array.is_valid(row).then(|| array.value_as_string(row));
+            to.extend((0..array.len()).map(|row| text(row).and_then(|text| text.parse().ok()).unwrap_or(f64::NAN)));
         }
     }
     let before = to.len();
@@ -349,17 +373,8 @@ fn append(array: &ArrayRef, origin: i64, unit_s: f64, to: &mut Vec<f64>) {
                 to.extend(array.iter().map(|value| value.map_or(f64::NAN, |value| f64::from(u8::from(value)))));
             }
         }
-        // Their text is exact, and the nearest number to it.
-        DataType::Decimal128(..) => {
-            if let Some(array) = array.as_any().downcast_ref::<Decimal128Array>() {
-                to.extend((0..array.len()).map(|row| if array.is_null(row) { f64::NAN } else { array.value_as_string(row).parse().unwrap_or(f64::NAN) }));
-            }
-        }
-        DataType::Decimal256(..) => {
-            if let Some(array) = array.as_any().downcast_ref::<Decimal256Array>() {
-                to.extend((0..array.len()).map(|row| if array.is_null(row) { f64::NAN } else { array.value_as_string(row).parse().unwrap_or(f64::NAN) }));
-            }
-        }
+        DataType::Decimal128(..) => decimals::<Decimal128Type>(array, to),
+        DataType::Decimal256(..) => decimals::<Decimal256Type>(array, to),
         _ => {}
     }
     // A column of another type than the table says has no numbers.

@@ -16,7 +16,9 @@ pub(super) const FORMAT: Format = Format {
     name: "hdf5",
     about: "HDF5 (h5py, exports of Dewesoft, HBM, imc)",
     // Before the signature there may be a block of the user, of 512 bytes or more.
-    recognises: |head| [0, 512, 1024, 2048].iter().any(|at| head.get(*at..).is_some_and(|head| head.starts_with(SIGNATURE))),
+    recognises: |head| {
+        [0, 512, 1024, 2048].iter().any(|at| head.get(*at..).is_some_and(|head| head.starts_with(SIGNATURE)))
+    },
     open: |input| open(input).map(|file| Box::new(file) as Box<dyn ChannelFile>),
 };
 
@@ -61,13 +63,17 @@ pub(super) fn open(input: &InputFile) -> Result<impl ChannelFile + use<>> {
 impl Hdf5 {
     fn dataset(&mut self, number: usize) {
         let dataset = &self.file.datasets[number];
-        let (name, group) = dataset.path.split_last().map_or((String::new(), String::new()), |(name, group)| (name.clone(), group.join("/")));
+        let (name, group) = dataset
+            .path
+            .split_last()
+            .map_or((String::new(), String::new()), |(name, group)| (name.clone(), group.join("/")));
         let shape: Vec<u64> = dataset.shape.iter().map(|extent| *extent as u64).collect();
         // Distances do not matter: numbers are asked for by their place.
         let found = lines(&shape, &vec![0; shape.len()]).unwrap_or_default();
         let (mut channels, mut parts) = (Vec::new(), Vec::new());
         if dataset.numbers.is_empty() || dataset.text.is_some() {
-            let mut channel = Channel::new(&*group, &*name, if dataset.text.is_some() { Kind::Text } else { Kind::Other }, 1);
+            let mut channel =
+                Channel::new(&*group, &*name, if dataset.text.is_some() { Kind::Text } else { Kind::Other }, 1);
             channel.properties.extend(dataset.text.clone().map(|text| (hints::TEXT.to_owned(), text)));
             channels.push(channel);
             let line = Line { suffix: String::new(), samples: 0, offset: 0, stride: 0, time: 0, at: 0 };
@@ -87,7 +93,11 @@ impl Hdf5 {
                         // One for all, or one a column.
                         match values[..] {
                             [one] => one,
-                            _ => values.get(line.at as usize).copied().filter(|_| values.len() == found.len()).unwrap_or(default),
+                            _ => values
+                                .get(line.at as usize)
+                                .copied()
+                                .filter(|_| values.len() == found.len())
+                                .unwrap_or(default),
                         }
                     };
                     let (gain, offset) = (of(&GAINS, 1.0), of(&OFFSETS, 0.0));
@@ -106,7 +116,13 @@ impl Hdf5 {
 
     /// What attributes say: the dataset's own, or those of a group above it.
     fn describe(&self, dataset: &ForeignDataset, channel: &mut Channel) {
-        let above = |levels: usize| self.file.groups.iter().find(|(path, _)| path[..] == dataset.path[..levels]).map(|(_, attributes)| attributes);
+        let above = |levels: usize| {
+            self.file
+                .groups
+                .iter()
+                .find(|(path, _)| path[..] == dataset.path[..levels])
+                .map(|(_, attributes)| attributes)
+        };
         let all: Vec<&Attributes> =
             std::iter::once(&dataset.attributes).chain((0..dataset.path.len()).rev().filter_map(above)).collect();
         channel.unit = all.iter().take(2).find_map(|attributes| text(attributes, &UNITS));
@@ -117,7 +133,9 @@ impl Hdf5 {
                 _ => None,
             }
         };
-        channel.rate_hz = all.iter().find_map(|attributes| one(attributes, is_rate).or_else(|| one(attributes, is_step).map(f64::recip)));
+        channel.rate_hz = all
+            .iter()
+            .find_map(|attributes| one(attributes, is_rate).or_else(|| one(attributes, is_step).map(f64::recip)));
         channel.start_s = all.iter().find_map(|attributes| numbers(attributes, &STARTS)?.first().copied());
         let shown = |(name, value): &(String, AttributeValue)| match value {
             AttributeValue::Text(text) => (name.clone(), text.clone()),
@@ -189,8 +207,9 @@ impl Rows {
             return Ok(false);
         }
         let across = self.dataset.shape.iter().enumerate();
-        let at: Vec<usize> =
-            across.map(|(dimension, extent)| if dimension == line.time || *extent == 1 { 0 } else { line.at as usize }).collect();
+        let at: Vec<usize> = across
+            .map(|(dimension, extent)| if dimension == line.time || *extent == 1 { 0 } else { line.at as usize })
+            .collect();
         self.values = self.dataset.read(field.as_deref(), line.time, &at, self.next..end)?;
         if (*gain, *offset) != (1.0, 0.0) {
             self.values.iter_mut().for_each(|value| *value = *value * gain + offset);

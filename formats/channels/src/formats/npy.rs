@@ -64,7 +64,11 @@ impl Arrays {
         let elements = array.shape.iter().try_fold(1_u64, |product, extent| product.checked_mul(*extent));
         let stated = elements.and_then(|elements| elements.checked_mul(array.width));
         if stated.is_none_or(|stated| stated > end.saturating_sub(data)) {
-            let problem = format!("the shape {:?} was declared, the file has {} bytes for it", array.shape, end.saturating_sub(data));
+            let problem = format!(
+                "the shape {:?} was declared, the file has {} bytes for it",
+                array.shape,
+                end.saturating_sub(data)
+            );
             return Err(bytes.damaged(problem));
         }
         self.channels_of(name, &array, data, &mut bytes)
@@ -72,8 +76,11 @@ impl Arrays {
 
     fn channels_of(&mut self, name: &str, array: &Array, data: u64, bytes: &mut Bytes) -> Result<()> {
         let mut strides = vec![array.width; array.shape.len()];
-        let inwards: Vec<usize> =
-            if array.is_fortran { (1..strides.len()).collect() } else { (0..strides.len().saturating_sub(1)).rev().collect() };
+        let inwards: Vec<usize> = if array.is_fortran {
+            (1..strides.len()).collect()
+        } else {
+            (0..strides.len().saturating_sub(1)).rev().collect()
+        };
         for dimension in inwards {
             let inner = if array.is_fortran { dimension - 1 } else { dimension + 1 };
             strides[dimension] = strides[inner] * array.shape[inner];
@@ -88,7 +95,8 @@ impl Arrays {
                 };
                 let mut channel = Channel::new(group, plain + &line.suffix, field.kind, line.samples);
                 let place = data + line.offset + field.offset;
-                let run = Run::spaced(place, line.samples, line.stride.max(array.width), field.kind, field.is_big_endian);
+                let run =
+                    Run::spaced(place, line.samples, line.stride.max(array.width), field.kind, field.is_big_endian);
                 let mut scaling = None;
                 if let (Kind::Time, Some(unit_s)) = (field.kind, field.unit_s) {
                     // Counted from the first, so that digits are left for the steps.
@@ -286,7 +294,8 @@ impl Literal {
                 Some(if first == '{' { Self::Table(entries) } else { Self::List(items) })
             }
             _ => {
-                let end = rest.find(|character: char| !(character.is_ascii_alphanumeric() || "_.-+".contains(character)));
+                let end =
+                    rest.find(|character: char| !(character.is_ascii_alphanumeric() || "_.-+".contains(character)));
                 let (word, behind) = rest.split_at(end.filter(|end| *end > 0)?);
                 *rest = behind.trim_start();
                 // Python 2 wrote long numbers as 3L.
@@ -303,11 +312,21 @@ mod tests {
 
     #[test]
     fn headers_are_literals_of_python() {
-        let array = Array::parsed("{'descr': [('a', '<f8'), ('', '|V3'), ('b', '>i2', (2,))], 'fortran_order': True, 'shape': (3L,), }").unwrap();
+        let array = Array::parsed(
+            "{'descr': [('a', '<f8'), ('', '|V3'), ('b', '>i2', (2,))], 'fortran_order': True, 'shape': (3L,), }",
+        )
+        .unwrap();
         assert_eq!((array.width, array.shape, array.is_fortran), (15, vec![3], true));
         let fields: Vec<(&str, u64)> = array.fields.iter().map(|field| (field.name.as_str(), field.offset)).collect();
         assert_eq!(fields, [("a", 0), ("", 8), ("b[0]", 11), ("b[1]", 13)]);
-        for text in ["", "{", "{'descr': '<f8'}", "[[[[[[[[[[", "{'descr': '|O', 'fortran_order': False, 'shape': (3,)}", "{'descr': '<f8', 'shape': (-1,)}"] {
+        for text in [
+            "",
+            "{",
+            "{'descr': '<f8'}",
+            "[[[[[[[[[[",
+            "{'descr': '|O', 'fortran_order': False, 'shape': (3,)}",
+            "{'descr': '<f8', 'shape': (-1,)}",
+        ] {
             assert!(Array::parsed(text).is_none(), "{text}");
         }
     }

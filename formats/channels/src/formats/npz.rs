@@ -13,7 +13,8 @@ pub(super) const FORMAT: Format = Format {
     about: "NPZ (NumPy)",
     // The first member's name is behind 30 bytes.
     recognises: |head| {
-        head.starts_with(b"PK\x03\x04") && head.iter().take(300).copied().collect::<Vec<u8>>().windows(4).any(|end| end == b".npy")
+        head.starts_with(b"PK\x03\x04")
+            && head.iter().take(300).copied().collect::<Vec<u8>>().windows(4).any(|end| end == b".npy")
     },
     open: |input| open(input).map(|file| Box::new(file) as Box<dyn ChannelFile>),
 };

@@ -5,7 +5,7 @@ use runout_core::{Result, clock::ClockScan, input_file::InputFile};
 use super::Format;
 use crate::{
     bytes::{Bytes, text},
-    channel::{Channel, ChannelFile, Kind, Samples, checked},
+    channel::{Channel, ChannelFile, Kind, Samples, SideBySide, checked},
     strided::{Column, Run, StridedSamples},
     unit::{self, Known},
 };
@@ -15,7 +15,8 @@ pub(super) const FORMAT: Format = Format {
     about: "UFF 58 (modal analysis, Testlab, B&K)",
     recognises: |head| {
         let mut lines = head.split(|byte| *byte == b'\n').filter(|line| !line.trim_ascii().is_empty());
-        let is_number = |line: &[u8]| line.trim_ascii().iter().all(|byte| byte.is_ascii_digit() || matches!(byte, b'b' | b' '));
+        let is_number =
+            |line: &[u8]| line.trim_ascii().iter().all(|byte| byte.is_ascii_digit() || matches!(byte, b'b' | b' '));
         lines.next().is_some_and(is_mark) && lines.next().is_some_and(is_number)
     },
     open: |input| Uff::open(input).map(|file| Box::new(file) as Box<dyn ChannelFile>),
@@ -47,7 +48,6 @@ struct Uff {
 struct Function {
     layout: Layout,
     points: u64,
-    /// Where the data begin.
     data: u64,
 }
 
@@ -64,7 +64,6 @@ enum Layout {
 struct Head {
     group: String,
     name: String,
-    /// 2, 4, 5 or 6.
     kind: i64,
     points: u64,
     is_even: bool,
@@ -78,8 +77,13 @@ struct Head {
 
 impl Uff {
     fn open(input: &InputFile) -> Result<Self> {
-        let mut file =
-            Self { input: input.clone(), channels: Vec::new(), parts: Vec::new(), functions: Vec::new(), remarks: Vec::new() };
+        let mut file = Self {
+            input: input.clone(),
+            channels: Vec::new(),
+            parts: Vec::new(),
+            functions: Vec::new(),
+            remarks: Vec::new(),
+        };
         let mut bytes = Bytes::open(&input.into())?;
         loop {
             // Between datasets there may be anything.
@@ -97,9 +101,7 @@ impl Uff {
                     let words: Vec<i64> = words.map_while(|word| word.parse().ok()).collect();
                     file.function(&mut bytes, Some(&words))?;
                 }
-                _ => {
-                    while bytes.line(LONGEST_LINE)?.is_some_and(|line| !is_mark(&line)) {}
-                }
+                _ => while bytes.line(LONGEST_LINE)?.is_some_and(|line| !is_mark(&line)) {},
             }
         }
         Ok(file)
@@ -121,7 +123,8 @@ impl Uff {
             Some(words) => {
                 let [order, float, _, stated] = *words.first_chunk().unwrap_or(&[0; 4]);
                 if !matches!(order, 1 | 2) || float != 2 {
-                    let problem = format!("expected IEEE numbers (2) in an order of 1 or 2, found the codes {float} and {order}");
+                    let problem =
+                        format!("expected IEEE numbers (2) in an order of 1 or 2, found the codes {float} and {order}");
                     return Err(bytes.damaged(problem));
                 }
                 let kind = if is_double { Kind::F64 } else { Kind::F32 };
@@ -243,21 +246,6 @@ impl ChannelFile for Uff {
     }
 }
 
-/// Readers of one channel each.
-pub(crate) struct SideBySide(pub(crate) Vec<Box<dyn Samples>>);
-
-impl Samples for SideBySide {
-    fn next(&mut self, most: usize, columns: &mut [Vec<f64>]) -> Result<usize> {
-        let mut longest = 0;
-        for (samples, column) in self.0.iter_mut().zip(columns) {
-            let before = column.len();
-            while column.len() - before < most && samples.next(most - (column.len() - before), std::slice::from_mut(column))? > 0 {}
-            longest = longest.max(column.len() - before);
-        }
-        Ok(longest)
-    }
-}
-
 impl Head {
     fn read(bytes: &mut Bytes) -> Result<Self> {
         let mut lines = Vec::with_capacity(11);
@@ -280,7 +268,11 @@ impl Head {
         let entity = field(5, 31, 10);
         let node = whole(5, 41, 10).unwrap_or(0);
         let direction = whole(5, 51, 4).unwrap_or(0);
-        let place = if node == 0 { String::new() } else { format!("{node}{}", DIRECTIONS.get((direction + 6) as usize).unwrap_or(&"")) };
+        let place = if node == 0 {
+            String::new()
+        } else {
+            format!("{node}{}", DIRECTIONS.get((direction + 6) as usize).unwrap_or(&""))
+        };
         let entity = if entity == "NONE" { String::new() } else { entity };
         let name = match (entity.is_empty(), place.is_empty()) {
             (false, true) => entity,

@@ -74,7 +74,10 @@ impl Wav {
         let mut remarks = Vec::new();
         let is_open = length == UNKNOWN || (length == 0 && present > 0);
         if is_open {
-            remarks.push(format!("{}: the length of the data is not stated: all to the end are used", input.path().display()));
+            remarks.push(format!(
+                "{}: the length of the data is not stated: all to the end are used",
+                input.path().display()
+            ));
         } else if length > present {
             return Err(bytes.damaged(format!("{length} bytes of samples were declared, the file has {present}")));
         }
@@ -134,7 +137,9 @@ impl Layout {
             }
         };
         if frame % channels != 0 || rate_hz == 0 {
-            return Err(bytes.damaged(format!("expected a rate and whole samples, found {rate_hz} Hz, {frame} bytes a frame")));
+            return Err(
+                bytes.damaged(format!("expected a rate and whole samples, found {rate_hz} Hz, {frame} bytes a frame"))
+            );
         }
         // Full scale is 1, a power of two from the codes: numbers stay exact.
         let scaling = match kind {

@@ -62,11 +62,18 @@ impl Variables {
             stride = stride.saturating_mul(*extent);
         }
         for line in lines(&matrix.shape, &strides).unwrap_or_default() {
-            let mut channel = Channel::new(&*matrix.group, matrix.name.clone() + &line.suffix, matrix.kind, line.samples);
+            let mut channel =
+                Channel::new(&*matrix.group, matrix.name.clone() + &line.suffix, matrix.kind, line.samples);
             channel.limits = matrix.kind.codes();
             self.channels.push(channel);
             let Run { offset, kind, is_big_endian, .. } = matrix.first;
-            self.runs.push(Run::spaced(offset + line.offset, line.samples, line.stride.max(width), kind, is_big_endian));
+            self.runs.push(Run::spaced(
+                offset + line.offset,
+                line.samples,
+                line.stride.max(width),
+                kind,
+                is_big_endian,
+            ));
         }
     }
 

@@ -31,7 +31,9 @@ fn type_of(code: u32, is_big_endian: bool) -> Option<(Kind, u32)> {
 /// The order of bytes of the header that begins here.
 fn order_of(head: &[u8]) -> Option<bool> {
     let code = *head.first_chunk::<4>()?;
-    [false, true].into_iter().find(|big| type_of(if *big { u32::from_be_bytes(code) } else { u32::from_le_bytes(code) }, *big).is_some())
+    [false, true]
+        .into_iter()
+        .find(|big| type_of(if *big { u32::from_be_bytes(code) } else { u32::from_le_bytes(code) }, *big).is_some())
 }
 
 pub(super) fn recognises(head: &[u8]) -> bool {
@@ -42,7 +44,9 @@ pub(super) fn recognises(head: &[u8]) -> bool {
     };
     let (Some(is_complex), Some(length)) = (number(12), number(16)) else { return false };
     let name = head.get(20..20 + (length.min(LONGEST_NAME) as usize)).unwrap_or_default();
-    let is_name = |(last, rest): (&u8, &[u8])| *last == 0 && rest.iter().all(|byte| byte.is_ascii_alphanumeric() || *byte == b'_');
+    let is_name = |(last, rest): (&u8, &[u8])| {
+        *last == 0 && rest.iter().all(|byte| byte.is_ascii_alphanumeric() || *byte == b'_')
+    };
     is_complex <= 1 && (2..=LONGEST_NAME).contains(&length) && name.split_last().is_some_and(is_name)
 }
 
@@ -52,7 +56,9 @@ pub(super) fn open(input: &InputFile) -> Result<Variables> {
     while bytes.rest() > 0 {
         let code: [u8; 4] = bytes.array()?;
         let Some(is_big_endian) = order_of(&code) else {
-            return Err(bytes.damaged(format!("expected the header of a matrix, found the type {}", u32::from_le_bytes(code))));
+            return Err(
+                bytes.damaged(format!("expected the header of a matrix, found the type {}", u32::from_le_bytes(code)))
+            );
         };
         bytes.is_big_endian = is_big_endian;
         let code = if is_big_endian { u32::from_be_bytes(code) } else { u32::from_le_bytes(code) };
@@ -65,7 +71,9 @@ pub(super) fn open(input: &InputFile) -> Result<Variables> {
         let shape = vec![rows, columns];
         let size = bytes_of(&shape, kind.bytes() as u64);
         let Some(size) = size.filter(|size| *size <= bytes.rest()) else {
-            return Err(bytes.damaged(format!("`{name}`: {rows} by {columns} numbers were declared, the file ends before")));
+            return Err(
+                bytes.damaged(format!("`{name}`: {rows} by {columns} numbers were declared, the file ends before"))
+            );
         };
         let begin = bytes.place();
         match content {

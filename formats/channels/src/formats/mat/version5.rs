@@ -32,7 +32,8 @@ const DEEPEST: usize = 16;
 const MOST: usize = 1 << 18;
 
 pub(super) fn recognises(head: &[u8]) -> bool {
-    matches!(head.get(124..128), Some([0, 1, b'I', b'M'] | [1, 0, b'M', b'I'])) && head[..4].iter().all(|byte| *byte != 0)
+    matches!(head.get(124..128), Some([0, 1, b'I', b'M'] | [1, 0, b'M', b'I']))
+        && head[..4].iter().all(|byte| *byte != 0)
 }
 
 pub(super) fn open(input: &InputFile) -> Result<Variables> {
@@ -77,7 +78,8 @@ fn unpacked(input: &InputFile, elements: &[Tag]) -> Result<(Source, Vec<u64>)> {
         let mut file = input.open()?;
         let is_packed = tag.kind == COMPRESSED;
         let from = if is_packed { tag.data } else { tag.begin };
-        std::io::Seek::seek(&mut file, std::io::SeekFrom::Start(from)).map_err(|error| Error::caused("read", &shown, error))?;
+        std::io::Seek::seek(&mut file, std::io::SeekFrom::Start(from))
+            .map_err(|error| Error::caused("read", &shown, error))?;
         let stored = file.take(tag.end() - from);
         let (begin, _) = if is_packed {
             unpacking.append(&mut ZlibDecoder::new(stored))?
@@ -233,7 +235,9 @@ impl Reader {
     fn numeric(&mut self, tag: &Tag, flags: u32, shape: Vec<u64>, group: &str, name: &str) -> Result<()> {
         let stored = self.element(tag)?;
         let Some(kind) = kind_of_element(stored.kind) else {
-            return Err(self.bytes.damaged(format!("`{name}`: expected numbers, found an element of type {}", stored.kind)));
+            return Err(self
+                .bytes
+                .damaged(format!("`{name}`: expected numbers, found an element of type {}", stored.kind)));
         };
         let size = bytes_of(&shape, kind.bytes() as u64);
         if size != Some(stored.length) {
@@ -243,7 +247,8 @@ impl Reader {
         let is_logical = flags & IS_LOGICAL != 0;
         let class = if is_logical { Some(Kind::Bool) } else { kind_of_class(flags & 0xFF) };
         let first = Run::dense(stored.data, 1, kind, self.bytes.is_big_endian);
-        let matrix = Matrix { group: group.to_owned(), name: name.to_owned(), shape, kind: class.unwrap_or(kind), first };
+        let matrix =
+            Matrix { group: group.to_owned(), name: name.to_owned(), shape, kind: class.unwrap_or(kind), first };
         self.variables.add(&matrix);
         if flags & IS_COMPLEX != 0 {
             let remark = format!("{}: `{name}` is complex: its real part is read", self.variables.source.shown());
@@ -266,11 +271,19 @@ fn characters(kind: u32, data: &[u8], is_big_endian: bool) -> String {
     let units: Vec<u16> = match kind {
         4 | 17 => data
             .chunks_exact(2)
-            .map(|pair| if is_big_endian { u16::from_be_bytes([pair[0], pair[1]]) } else { u16::from_le_bytes([pair[0], pair[1]]) })
+            .map(|pair| {
+                if is_big_endian {
+                    u16::from_be_bytes([pair[0], pair[1]])
+                } else {
+                    u16::from_le_bytes([pair[0], pair[1]])
+                }
+            })
             .collect(),
         _ => return text(data),
     };
-    String::from_utf16_lossy(&units).trim_matches(|character: char| character == '\0' || character.is_whitespace()).to_owned()
+    String::from_utf16_lossy(&units)
+        .trim_matches(|character: char| character == '\0' || character.is_whitespace())
+        .to_owned()
 }
 
 fn kind_of_element(kind: u32) -> Option<Kind> {

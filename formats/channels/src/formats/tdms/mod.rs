@@ -43,8 +43,7 @@ struct Data {
 impl Tdms {
     fn open(input: &InputFile) -> Result<Self> {
         let Segments { objects, remarks, .. } = Segments::read(input)?;
-        let mut file =
-            Self { input: input.clone(), channels: Vec::new(), data: Vec::new(), remarks };
+        let mut file = Self { input: input.clone(), channels: Vec::new(), data: Vec::new(), remarks };
         let empty = Properties::new();
         let above: HashMap<String, &Properties> =
             objects.iter().map(|object| (object.path.clone(), &object.properties)).collect();
@@ -56,7 +55,8 @@ impl Tdms {
             let mut channel = Channel::new(group, name, object.kind, object.samples());
             let property = |name: &str| object.properties.get(name);
             let number = |name: &str| property(name).and_then(Value::number);
-            let unit = ["unit_string", "NI_UnitDescription"].iter().find_map(|name| property(name).and_then(Value::text));
+            let unit =
+                ["unit_string", "NI_UnitDescription"].iter().find_map(|name| property(name).and_then(Value::text));
             channel.unit = unit.filter(|unit| !unit.is_empty());
             channel.rate_hz = number("wf_increment").filter(|step| *step > 0.0 && step.is_finite()).map(f64::recip);
             channel.start_s = number("wf_start_offset");

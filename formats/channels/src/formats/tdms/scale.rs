@@ -26,9 +26,20 @@ enum Step {
     /// The raw number.
     Raw,
     Copy(Input),
-    Linear { slope: f64, intercept: f64, of: Input },
-    Polynomial { coefficients: Vec<f64>, of: Input },
-    Table { raw: Vec<f64>, scaled: Vec<f64>, of: Input },
+    Linear {
+        slope: f64,
+        intercept: f64,
+        of: Input,
+    },
+    Polynomial {
+        coefficients: Vec<f64>,
+        of: Input,
+    },
+    Table {
+        raw: Vec<f64>,
+        scaled: Vec<f64>,
+        of: Input,
+    },
     Add(Input, Input),
     /// The right operand less the left one, as National Instruments' own readers have it.
     Subtract(Input, Input),
@@ -89,7 +100,9 @@ impl Scaling for Chain {
             }
         }
         // One straight line is what most channels have.
-        if let [Step::Raw, Step::Linear { slope, intercept, .. }] | [Step::Linear { slope, intercept, of: None }] = &self.steps[..] {
+        if let [Step::Raw, Step::Linear { slope, intercept, .. }] | [Step::Linear { slope, intercept, of: None }] =
+            &self.steps[..]
+        {
             for value in values {
                 *value = *value * slope + intercept;
             }
@@ -110,9 +123,8 @@ fn is_scaled(properties: &Properties) -> bool {
 /// How many scales there are.
 fn count(properties: &Properties) -> Option<usize> {
     let stated = properties.get("NI_Number_Of_Scales").and_then(Value::number).map(|count| count as usize);
-    let index = |name: &String| -> Option<usize> {
-        name.strip_prefix("NI_Scale[")?.strip_suffix("]_Scale_Type")?.parse().ok()
-    };
+    let index =
+        |name: &String| -> Option<usize> { name.strip_prefix("NI_Scale[")?.strip_suffix("]_Scale_Type")?.parse().ok() };
     let highest = || properties.keys().filter_map(index).max().map(|highest| highest + 1);
     stated.or_else(highest).filter(|count| *count > 0)
 }

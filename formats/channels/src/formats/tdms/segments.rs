@@ -78,8 +78,13 @@ pub(super) struct Segments {
 
 impl Segments {
     pub(super) fn read(input: &InputFile) -> Result<Self> {
-        let mut all =
-            Self { objects: Vec::new(), remarks: Vec::new(), by_path: HashMap::new(), list: Vec::new(), has_list: false };
+        let mut all = Self {
+            objects: Vec::new(),
+            remarks: Vec::new(),
+            by_path: HashMap::new(),
+            list: Vec::new(),
+            has_list: false,
+        };
         let mut bytes = Bytes::open(&input.into())?;
         let shown = input.path().display();
         while bytes.rest() > 0 {
@@ -103,7 +108,8 @@ impl Segments {
             let is_cut = stated_end > bytes.length();
             if is_cut {
                 if data > end {
-                    all.remarks.push(format!("{shown}: its last segment was interrupted in its metadata: it is not used"));
+                    all.remarks
+                        .push(format!("{shown}: its last segment was interrupted in its metadata: it is not used"));
                     break;
                 }
                 all.remarks.push(format!("{shown}: its last segment was interrupted: what is there of it is used"));
@@ -168,7 +174,8 @@ impl Segments {
 
     /// Adds what a segment holds to its objects.
     fn raw_data(&mut self, raw: &Raw) -> Result<()> {
-        let active: Vec<usize> = self.list.iter().filter(|(_, has_data)| *has_data).map(|(number, _)| *number).collect();
+        let active: Vec<usize> =
+            self.list.iter().filter(|(_, has_data)| *has_data).map(|(number, _)| *number).collect();
         let indices: Vec<Index> = active.iter().filter_map(|number| self.objects[*number].index.clone()).collect();
         let with_daqmx = indices.iter().filter(|index| index.daqmx.is_some()).count();
         if with_daqmx > 0 && with_daqmx < indices.len() {
@@ -283,7 +290,11 @@ impl Raw<'_> {
             let place = self.data + before + scaler.byte;
             let mut of_object = Vec::with_capacity(2);
             if whole > 0 {
-                of_object.push(Run { repeats: whole, period: chunk, ..self.run(place, index.values, width, scaler.kind) });
+                of_object.push(Run {
+                    repeats: whole,
+                    period: chunk,
+                    ..self.run(place, index.values, width, scaler.kind)
+                });
             }
             let part = (rest.saturating_sub(before) / width.max(1)).min(index.values);
             of_object.push(self.run(place + whole * chunk, part, width, scaler.kind));

@@ -60,7 +60,8 @@ pub(super) fn number(cell: &[u8], decimal: u8) -> Option<f64> {
     } {
         return Some(sign * f64::INFINITY);
     }
-    if matches!(text.as_str(), "NaN" | "nan" | "NAN" | "-NaN" | "1.#QNAN" | "NaN (IND)" | "n/a" | "N/A" | "--" | "---") {
+    if matches!(text.as_str(), "NaN" | "nan" | "NAN" | "-NaN" | "1.#QNAN" | "NaN (IND)" | "n/a" | "N/A" | "--" | "---")
+    {
         return Some(f64::NAN);
     }
     if !text.starts_with(|first: char| first.is_ascii_digit() || matches!(first, '-' | '+' | '.' | ',')) {
@@ -93,7 +94,8 @@ pub(super) fn instant_s(cell: &[u8]) -> Option<f64> {
     if !is_whole(hours) || !is_whole(minutes) || !seconds.starts_with(|first: char| first.is_ascii_digit()) {
         return None;
     }
-    let (hours, minutes, seconds): (f64, f64, f64) = (hours.parse().ok()?, minutes.parse().ok()?, seconds.parse().ok()?);
+    let (hours, minutes, seconds): (f64, f64, f64) =
+        (hours.parse().ok()?, minutes.parse().ok()?, seconds.parse().ok()?);
     Some(days * 86_400.0 + hours * 3600.0 + minutes * 60.0 + seconds - shift_s)
 }
 

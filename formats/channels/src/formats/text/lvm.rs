@@ -95,7 +95,12 @@ fn segment(bytes: &mut Bytes, file: &Entries) -> Result<Table> {
     let shown: Vec<Line> = head(bytes, SHOWN)?.into_iter().take_while(|line| !is_next(&line.text)).collect();
     // What is stated is that of the machine, which its numbers need not have.
     let held = |decimal: u8| {
-        let of_line = |line: &Line| cells(&line.text, delimiter).iter().filter(|cell| !cell.is_empty() && number(cell, decimal).is_some()).count();
+        let of_line = |line: &Line| {
+            cells(&line.text, delimiter)
+                .iter()
+                .filter(|cell| !cell.is_empty() && number(cell, decimal).is_some())
+                .count()
+        };
         shown.iter().map(of_line).sum::<usize>()
     };
     let stated = if file.value("Decimal_Separator") == "," { [b',', b'.'] } else { [b'.', b','] };
@@ -108,7 +113,8 @@ fn segment(bytes: &mut Bytes, file: &Entries) -> Result<Table> {
     let has_many_x = header.names.iter().filter(|name| is_x(name)).count() > 1;
     // Entries are above their columns.
     let units = entries.values("Y_Unit_Label");
-    header.units = (0..header.names.len()).map(|column| units.get(column.wrapping_sub(1)).cloned().unwrap_or_default()).collect();
+    header.units =
+        (0..header.names.len()).map(|column| units.get(column.wrapping_sub(1)).cloned().unwrap_or_default()).collect();
     let is_time = entries.value("X_Dimension").is_empty() || entries.value("X_Dimension") == "Time";
     for (column, name) in header.names.iter().enumerate() {
         if is_x(name) {

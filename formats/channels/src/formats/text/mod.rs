@@ -27,7 +27,10 @@ pub(super) const FORMAT: Format = Format {
         let has_digits = head.iter().any(u8::is_ascii_digit) || head.starts_with(GZIP);
         // JSON is no table.
         let is_json = matches!(head.trim_ascii_start().first(), Some(b'{' | b'['));
-        head.starts_with(GZIP) || lvm::is_beginning(head) || is_utf16 || (has_digits && !is_json && head.iter().all(is_character))
+        head.starts_with(GZIP)
+            || lvm::is_beginning(head)
+            || is_utf16
+            || (has_digits && !is_json && head.iter().all(is_character))
     },
     open: |input| Text::open(input).map(|file| Box::new(file) as Box<dyn ChannelFile>),
 };
@@ -50,7 +53,8 @@ impl Text {
     fn open(input: &InputFile) -> Result<Self> {
         let source = plain(input)?;
         let mut bytes = Bytes::open(&source)?;
-        let mut file = Self { source, channels: Vec::new(), places: Vec::new(), tables: Vec::new(), remarks: Vec::new() };
+        let mut file =
+            Self { source, channels: Vec::new(), places: Vec::new(), tables: Vec::new(), remarks: Vec::new() };
         let tables = if lvm::is_lvm(&mut bytes)? { lvm::tables(&mut bytes)? } else { vec![Table::found(&mut bytes)?] };
         let several = tables.len() > 1;
         for (number, mut table) in tables.into_iter().enumerate() {
@@ -152,10 +156,13 @@ impl<R: Read> Read for Utf16<R> {
             if units.is_empty() {
                 return Ok(0);
             }
-            let of = |pair: &[u8; 2]| if self.is_big_endian { u16::from_be_bytes(*pair) } else { u16::from_le_bytes(*pair) };
-            let mut all: Vec<u16> = self.high.take().into_iter().chain(units.as_chunks::<2>().0.iter().map(of)).collect();
+            let of =
+                |pair: &[u8; 2]| if self.is_big_endian { u16::from_be_bytes(*pair) } else { u16::from_le_bytes(*pair) };
+            let mut all: Vec<u16> =
+                self.high.take().into_iter().chain(units.as_chunks::<2>().0.iter().map(of)).collect();
             self.high = all.pop_if(|last| (0xD800..0xDC00).contains(last) && units.len() == 1 << 14);
-            let text: String = char::decode_utf16(all).map(|unit| unit.unwrap_or(char::REPLACEMENT_CHARACTER)).collect();
+            let text: String =
+                char::decode_utf16(all).map(|unit| unit.unwrap_or(char::REPLACEMENT_CHARACTER)).collect();
             self.characters = text.into_bytes();
             self.used = 0;
         }

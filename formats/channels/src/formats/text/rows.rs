@@ -24,7 +24,8 @@ impl RowSamples {
     pub(super) fn open(source: &Source, table: &Table, columns: &[usize]) -> Result<Self> {
         let mut bytes = Bytes::open(source)?;
         bytes.seek(table.begin)?;
-        let origin = |column: &usize| (*column, table.origins.iter().find(|(known, _)| known == column).map(|(_, at_s)| *at_s));
+        let origin =
+            |column: &usize| (*column, table.origins.iter().find(|(known, _)| known == column).map(|(_, at_s)| *at_s));
         Ok(Self {
             bytes,
             shown: source.shown(),

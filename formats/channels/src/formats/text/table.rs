@@ -66,7 +66,8 @@ impl Table {
         };
         let header = Header::above(&lines[..first], dialect, width)?;
         let preamble = Preamble::of(&lines[..first], dialect);
-        let mut table = Self::of(bytes, &lines[first..end], first as u64, dialect, &header, |_, line| is_passed_over(line))?;
+        let mut table =
+            Self::of(bytes, &lines[first..end], first as u64, dialect, &header, |_, line| is_passed_over(line))?;
         for (_, channel) in &mut table.channels {
             channel.rate_hz = channel.rate_hz.or(header.rate_hz).or(preamble.rate_hz);
             channel.start_s = channel.start_s.or(header.start_s);
@@ -92,7 +93,8 @@ impl Table {
             .filter(|cells| !without_end(cells).is_empty())
             .take(SHOWN)
             .collect();
-        let width = header.names.len().max(rows.iter().map(|row| without_end(row).len()).max().unwrap_or(0)).min(MOST_COLUMNS);
+        let width =
+            header.names.len().max(rows.iter().map(|row| without_end(row).len()).max().unwrap_or(0)).min(MOST_COLUMNS);
         for column in 0..width {
             let held = || rows.iter().filter_map(|row| row.get(column)).filter(|cell| !cell.is_empty());
             let (all, is_any) = (|is: &dyn Fn(&[u8]) -> bool| held().all(|cell| is(cell)), held().next().is_some());
@@ -223,7 +225,8 @@ fn longest_run(lines: &[Line], dialect: Dialect) -> Option<Run> {
         }
         let all = cells(&line.text, dialect.delimiter);
         let filled = without_end(&all);
-        let is_held = |cell: &&&[u8]| !cell.is_empty() && (number(cell, dialect.decimal).is_some() || instant_s(cell).is_some());
+        let is_held =
+            |cell: &&&[u8]| !cell.is_empty() && (number(cell, dialect.decimal).is_some() || instant_s(cell).is_some());
         let held = filled.iter().filter(is_held).count();
         let is_row = held > 0 && 2 * held >= filled.iter().filter(|cell| !cell.is_empty()).count();
         run = match run {
@@ -260,9 +263,15 @@ impl Header {
         };
         let mut header = Self::default();
         // Between blanks, a sentence would be names too.
-        let fits = |cells: &Vec<String>| if dialect.delimiter == b' ' { cells.len() == width } else { cells.len() >= width.min(2) };
+        let fits = |cells: &Vec<String>| {
+            if dialect.delimiter == b' ' { cells.len() == width } else { cells.len() >= width.min(2) }
+        };
         let Some(last) = above.next().map(split).filter(fits) else { return Ok(header) };
-        let is_unit = |cell: &String| cell.is_empty() || unit::known(cell).is_some() || (cell.starts_with(['(', '[']) && cell.ends_with([')', ']']));
+        let is_unit = |cell: &String| {
+            cell.is_empty()
+                || unit::known(cell).is_some()
+                || (cell.starts_with(['(', '[']) && cell.ends_with([')', ']']))
+        };
         let units = last.iter().take(width).filter(|cell| is_unit(cell)).count();
         let is_units = 2 * units >= width.min(last.len()) && last.iter().any(|cell| !cell.is_empty());
         let names = if is_units { above.next().map(split) } else { None };
@@ -280,7 +289,9 @@ impl Header {
         }
         let named = header.names.iter().rposition(|name| !name.is_empty()).map_or(0, |last| last + 1);
         if dialect.delimiter == b',' && width == 2 * named && named > 1 && header.rate_hz.is_none() {
-            let problem = format!("its rows have {width} cells for {named} names: decimal commas are not distinguishable from delimiters");
+            let problem = format!(
+                "its rows have {width} cells for {named} names: decimal commas are not distinguishable from delimiters"
+            );
             return Err(Error::new("read", "the table", problem)
                 .of(ErrorKind::DamagedData)
                 .help("export it with semicolons or tabs between columns, or with decimal points"));
@@ -316,7 +327,11 @@ impl Preamble {
             let Some((name, value)) = pair.filter(|_| rate_hz.is_none()) else { continue };
             let name = unit::split(name.trim().trim_matches('"')).0.to_lowercase().replace([' ', '-'], "_");
             let value = value.trim().split([char::from(dialect.delimiter), ' ']).next().unwrap_or_default();
-            let Some(value) = number(value.as_bytes(), dialect.decimal).filter(|value| *value > 0.0 && value.is_finite()) else { continue };
+            let Some(value) =
+                number(value.as_bytes(), dialect.decimal).filter(|value| *value > 0.0 && value.is_finite())
+            else {
+                continue;
+            };
             if is_rate(&name) {
                 rate_hz = Some(value);
             } else if is_step(&name) || name == "hresolution" {
