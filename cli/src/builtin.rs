@@ -9,6 +9,7 @@ pub fn registry() -> Registry {
     for register in [
         runout_hdf5::register,
         runout_csv::register,
+        runout_channels::register,
         runout_points::register,
         runout_preprocess::register,
         runout_spindle::register,

@@ -32,21 +32,43 @@ pub(crate) fn report(path: &Path) -> Result<Report> {
     let start = open_regular(path).and_then(|file| file.take(8).read_to_end(&mut signature));
     start.map_err(|error| Error::caused("inspect", path.display().to_string(), error))?;
     if signature == *b"\x89HDF\r\n\x1a\n" {
-        return runout_hdf5::inspect(path).map(Report::Hdf5);
+        let report = runout_hdf5::inspect(path)?;
+        if report.format.is_some() {
+            return Ok(Report::Hdf5(report));
+        }
+        return Ok(channels(path)?.unwrap_or(Report::Hdf5(report)));
     }
     if signature.starts_with(b"PAR1") {
-        return table(path).map(Report::Parquet);
+        let report = table(path)?;
+        // What this program wrote says so.
+        if report.metadata.keys().any(|key| key.starts_with("runout")) {
+            return Ok(Report::Parquet(report));
+        }
+        return Ok(channels(path)?.unwrap_or(Report::Parquet(report)));
+    }
+    if let Some(text) = runout_csv::inspect(path)?
+        && text.angle_by.is_some()
+    {
+        return Ok(Report::Text(text));
+    }
+    if let Some(report) = channels(path)? {
+        return Ok(report);
     }
     if let Some(text) = runout_csv::inspect(path)? {
         return Ok(Report::Text(text));
     }
-    let problem = "it is neither HDF5 nor Parquet, nor a table as text";
+    let problem = "it is of no format that is known here, nor a table as text";
     Err(Error::new("inspect", path.display().to_string(), problem)
         .of(ErrorKind::DamagedData)
         .help(
-            "inspect reads measurement files, results, Parquet tables and CSV files with a header. Columns of CSV files are delimited by comma, \
+            "inspect reads measurement files, results, recordings of named channels (TDMS, MAT, HDF5, LVM, NumPy, Parquet, Arrow, UFF, WAV) and CSV files with a header. Columns of CSV files are delimited by comma, \
              semicolon or tab (those of numbers with decimal commas by semicolon or tab), and lines before the header begin with `#`",
         ))
+}
+
+/// Named channels, where the file is of one of their formats.
+fn channels(path: &Path) -> Result<Option<Report>> {
+    Ok(runout_channels::inspect(path)?.map(Report::Channels))
 }
 
 /// Arrow's own schema, in Base64: the columns say the same.

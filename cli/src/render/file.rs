@@ -1,5 +1,6 @@
 //! What a file holds, for people.
 
+use runout_channels::{ChannelReport, ChannelsReport};
 use runout_csv::TextReport;
 use runout_hdf5::{FileReport, StationReport};
 
@@ -18,6 +19,7 @@ pub(crate) fn text(report: &Report) -> String {
         Report::Hdf5(file) => hdf5(&mut page, file),
         Report::Parquet(table) => parquet(&mut page, table),
         Report::Text(table) => csv(&mut page, table),
+        Report::Channels(file) => channels(&mut page, file),
     }
     page.into_text()
 }
@@ -66,6 +68,29 @@ fn captures(stations: &[StationReport]) -> Table {
         }
     }
     table
+}
+
+fn channels(page: &mut Page, file: &ChannelsReport) {
+    page.line(format_args!("{}, {} channels", file.format, file.channels.len()));
+    let header = ["channel", "unit", "type", "samples", "rate Hz", "starts s", "first readings"];
+    let mut table = Table::new(3, header);
+    let known = |value: Option<f64>| value.map_or_else(String::new, |value| significant(value, 6));
+    for ChannelReport { channel, first } in &file.channels {
+        table.row([
+            channel.path(),
+            channel.unit.clone().unwrap_or_default(),
+            channel.kind.name().to_owned(),
+            channel.samples.to_string(),
+            known(channel.rate_hz),
+            known(channel.start_s),
+            first.iter().map(|value| significant(*value, 6)).collect::<Vec<_>>().join(" "),
+        ]);
+    }
+    page.headed_table("Channels", &table);
+    page.line(format_args!("  the mark seems to be in: {}", file.mark.as_deref().unwrap_or("no channel")));
+    page.bullets("Remarks", &file.remarks);
+    page.heading("To load it");
+    file.load.lines().for_each(|line| page.line(line));
 }
 
 fn csv(page: &mut Page, table: &TextReport) {

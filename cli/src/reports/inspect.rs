@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use runout_channels::ChannelsReport;
 use runout_csv::TextReport;
 use runout_hdf5::FileReport;
 use serde::Serialize;
@@ -16,6 +17,8 @@ pub(crate) enum Report {
     Parquet(TableReport),
     /// Samples as text.
     Text(TextReport),
+    /// Named channels of other programs.
+    Channels(ChannelsReport),
 }
 
 /// A Parquet table in short.

@@ -23,6 +23,7 @@
 pub mod azimuth;
 pub mod calibrated;
 pub mod checksum;
+pub mod clock;
 pub mod creep;
 pub mod encoder;
 pub mod groove;

@@ -73,14 +73,7 @@ impl StageConfig for CsvConfig {
             return Err(Fault::at("stations", "expected at least one station"));
         }
         for (index, station) in self.stations.iter().enumerate() {
-            if station.name.is_empty() || stations.iter().any(|known| known.name == station.name) {
-                let message = format!("names of stations must differ and not be empty, found `{}`", station.name);
-                return Err(Fault::at("name", message).under_item("stations", index));
-            }
-            if !station.z_mm.is_finite() {
-                return Err(Fault::at("z_mm", "expected a finite position in mm").under_item("stations", index));
-            }
-            stations.push(StationKey { name: station.name.clone(), z_mm: station.z_mm });
+            stations.push(station.check(&stations).map_err(|fault| fault.under_item("stations", index))?);
         }
         stations.sort_by(|a, b| a.z_mm.total_cmp(&b.z_mm).then_with(|| a.name.cmp(&b.name)));
         if let Some(rate_hz) = self.sample_rate_hz.filter(|rate_hz| !(*rate_hz > 0.0 && *rate_hz <= HIGHEST_RATE_HZ)) {
@@ -108,6 +101,23 @@ impl StageConfig for CsvConfig {
             paths,
             stated: Stated { sample_rate_hz: self.sample_rate_hz, speed_rpm: self.speed_rpm, marker: self.marker },
         }))
+    }
+}
+
+impl StationConfig {
+    /// The station, where its name is none of `known`.
+    ///
+    /// # Errors
+    /// The first value that cannot be.
+    pub fn check(&self, known: &[StationKey]) -> std::result::Result<StationKey, Fault> {
+        if self.name.is_empty() || known.iter().any(|known| known.name == self.name) {
+            let message = format!("names of stations must differ and not be empty, found `{}`", self.name);
+            return Err(Fault::at("name", message));
+        }
+        if !self.z_mm.is_finite() {
+            return Err(Fault::at("z_mm", "expected a finite position in mm"));
+        }
+        Ok(StationKey { name: self.name.clone(), z_mm: self.z_mm })
     }
 }
 

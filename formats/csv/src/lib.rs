@@ -30,6 +30,7 @@ mod stated;
 
 pub use config::{CsvConfig, FileConfig, StationConfig};
 pub use inspect::{TextReport, inspect};
+pub use number::parse_number;
 use runout_core::pipeline::{Plugin, Registry};
 
 /// Adds the loader `csv`.

@@ -180,8 +180,9 @@ fn one_by_one(bytes: &[u8], decimal: u8) -> Option<(f64, usize)> {
     Some((digits as f64 / EXACT_POWERS[begin][fraction], place))
 }
 
-/// The number of a whole cell; NaN where it is empty, `None` where it holds none.
-pub(crate) fn of_cell(cell: &[u8], decimal: u8) -> Option<f64> {
+/// The number of a whole cell with `.` or `,` as its decimal mark; NaN where it is empty, `None` where it holds none.
+#[must_use]
+pub fn parse_number(cell: &[u8], decimal: u8) -> Option<f64> {
     if cell.is_empty() {
         return Some(f64::NAN);
     }
@@ -247,9 +248,9 @@ mod tests {
         ];
         for text in spellings {
             let expected: f64 = text.parse().unwrap();
-            let found = of_cell(text.as_bytes(), b'.').unwrap();
+            let found = parse_number(text.as_bytes(), b'.').unwrap();
             assert_eq!(found.to_bits(), expected.to_bits(), "{text}: {found} {expected}");
-            let found = of_cell(text.replace('.', ",").as_bytes(), b',').unwrap();
+            let found = parse_number(text.replace('.', ",").as_bytes(), b',').unwrap();
             assert_eq!(found.to_bits(), expected.to_bits(), "{text} with a comma");
             // With more of the line behind it, eight bytes at a time can be looked at.
             for (found, length) in every_way(format!("{text};1.0000000").as_bytes(), b'.').into_iter().flatten() {
@@ -257,7 +258,7 @@ mod tests {
                 assert_eq!((found, length), (plain.parse().unwrap(), plain.len()), "{text} in a line");
             }
         }
-        assert!(of_cell(b"", b'.').unwrap().is_nan() && of_cell(b"NaN", b'.').unwrap().is_nan());
+        assert!(parse_number(b"", b'.').unwrap().is_nan() && parse_number(b"NaN", b'.').unwrap().is_nan());
     }
 
     #[test]
@@ -269,7 +270,7 @@ mod tests {
             let value = (state >> 11) as f64 / 2f64.powi((state % 60) as i32);
             let text = format!("{value:.places$}");
             let expected: f64 = text.parse().unwrap();
-            assert_eq!(of_cell(text.as_bytes(), b'.').unwrap().to_bits(), expected.to_bits(), "{text}");
+            assert_eq!(parse_number(text.as_bytes(), b'.').unwrap().to_bits(), expected.to_bits(), "{text}");
             for (found, length) in every_way(format!("{text},-12345678").as_bytes(), b'.').into_iter().flatten() {
                 assert_eq!((found.to_bits(), length), (expected.to_bits(), text.len()), "{text} in a line");
             }
@@ -279,10 +280,10 @@ mod tests {
     #[test]
     fn what_is_no_number_is_refused() {
         for text in ["abc", "1.2.3", "1,5", "--1", "-", ".", "1 2", "0x10", "1e", "µ", "12abc", "1_000"] {
-            assert_eq!(of_cell(text.as_bytes(), b'.'), None, "{text}");
+            assert_eq!(parse_number(text.as_bytes(), b'.'), None, "{text}");
         }
         for text in ["1.5", "1.234,5", "1,2,3", ","] {
-            assert_eq!(of_cell(text.as_bytes(), b','), None, "{text}");
+            assert_eq!(parse_number(text.as_bytes(), b','), None, "{text}");
         }
     }
 }

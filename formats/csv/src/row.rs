@@ -107,7 +107,7 @@ impl Row<'_> {
             let (cell, after) = split(bytes, delimiter);
             rest = after;
             let readable = |value: &f64| matches!(role, Role::Sensor { .. }) || value.is_finite();
-            let value = number::of_cell(cell, self.decimal)
+            let value = number::parse_number(cell, self.decimal)
                 .filter(readable)
                 .ok_or_else(|| self.header.no_number(line.number, column, cell, self.decimal))?;
             match role {
@@ -137,7 +137,7 @@ impl Row<'_> {
             let (cell, after) = cell_at(rest, self.header.delimiter, column)
                 .map_err(|found| ragged(self.header, line.number, found))?;
             rest = (column + 1, after);
-            let value = number::of_cell(cell, self.decimal)
+            let value = number::parse_number(cell, self.decimal)
                 .filter(|value| value.is_finite())
                 .ok_or_else(|| self.header.no_number(line.number, column, cell, self.decimal))?;
             match self.roles[column] {

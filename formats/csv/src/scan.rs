@@ -5,6 +5,7 @@ use std::num::NonZeroUsize;
 
 use runout_core::{
     Error, ErrorKind, Result,
+    clock::ClockScan,
     encoder::EncoderScan,
     marker::{Marker, MarkerScan},
     measurement::Block,
@@ -35,7 +36,7 @@ impl Scan {
         let Header { phase, time: time_column, ref shown, .. } = rows.format.header;
         let (shown, channels) = (shown.clone(), rows.format.header.sensors.len());
         let mut turns = Turns::new(phase, marker);
-        let mut time = TimeScan::default();
+        let mut time = ClockScan::default();
         let mut samples: u64 = 0;
         let mut kept = Some(Vec::new());
         let wanted = |lines: u64| lines.saturating_mul(channels as u64) <= most_kept as u64;
@@ -134,80 +135,5 @@ impl IndexScan {
         self.high = high;
         self.samples += 1;
         Ok(())
-    }
-}
-
-/// Times that are kept, to see at the end whether the rate held: at least half as many.
-const MOST_PLACES: usize = 256;
-
-/// Share of the duration by which a time may be off the line from the first to the last: clocks are better by far.
-const LARGEST_DRIFT: f64 = 1e-3;
-
-/// Finds the sampling rate and whether it holds.
-#[derive(Debug)]
-struct TimeScan {
-    samples: u64,
-    first_s: f64,
-    last_s: f64,
-    /// Of each so many samples one time is kept.
-    stride: u64,
-    /// Samples and their times.
-    places: Vec<(u64, f64)>,
-}
-
-impl Default for TimeScan {
-    fn default() -> Self {
-        Self { samples: 0, first_s: 0.0, last_s: 0.0, stride: 1, places: Vec::with_capacity(MOST_PLACES) }
-    }
-}
-
-impl TimeScan {
-    /// Each time has to be where those before it lead, to half a step: rounding stays below, a lost sample does not.
-    fn push(&mut self, time_s: f64) -> std::result::Result<(), String> {
-        if self.samples == 0 {
-            self.first_s = time_s;
-        } else {
-            if time_s <= self.last_s {
-                return Err(format!("expected a time above {} s, found {time_s} s", self.last_s));
-            }
-            if self.samples > 1 {
-                let step_s = (self.last_s - self.first_s) / (self.samples - 1) as f64;
-                let expected_s = self.first_s + step_s * self.samples as f64;
-                if (time_s - expected_s).abs() > 0.5 * step_s {
-                    return Err(format!("expected even steps, the next at {expected_s} s, found {time_s} s"));
-                }
-            }
-        }
-        if self.samples.is_multiple_of(self.stride) {
-            if self.places.len() == MOST_PLACES {
-                self.stride *= 2;
-                self.places.retain(|(sample, _)| sample.is_multiple_of(self.stride));
-            }
-            if self.samples.is_multiple_of(self.stride) {
-                self.places.push((self.samples, time_s));
-            }
-        }
-        self.last_s = time_s;
-        self.samples += 1;
-        Ok(())
-    }
-
-    /// The mean rate, where all times are where it leads: a rate that changes slowly has each time where those before it lead.
-    fn rate_hz(&self) -> std::result::Result<Option<f64>, String> {
-        if self.samples < 2 {
-            return Ok(None);
-        }
-        let duration_s = self.last_s - self.first_s;
-        let step_s = duration_s / (self.samples - 1) as f64;
-        let drift_s = |(sample, time_s): &(u64, f64)| time_s - self.first_s - step_s * *sample as f64;
-        let largest = self.places.iter().max_by(|one, other| drift_s(one).abs().total_cmp(&drift_s(other).abs()));
-        match largest.map(|place| (place.0, drift_s(place))) {
-            Some((sample, drift_s)) if drift_s.abs() > step_s.max(LARGEST_DRIFT * duration_s) => Err(format!(
-                "expected even steps, found sample {sample} {} s {} where steps of {step_s:.6e} s lead: the sampling rate changes",
-                (drift_s.abs() * 1e6).round() / 1e6,
-                if drift_s > 0.0 { "after" } else { "before" },
-            )),
-            _ => Ok(Some(1.0 / step_s)),
-        }
     }
 }

@@ -18,6 +18,7 @@
 //!
 //! The C library behind it is not safe for threads; the `hdf5-metno` crate lets one thread in at a time.
 
+mod foreign;
 mod heaps;
 mod height_map;
 mod inspect;
@@ -31,6 +32,7 @@ mod text;
 mod type_name;
 mod utf8_path;
 
+pub use foreign::{AttributeValue, Attributes, ForeignDataset, ForeignFile};
 pub use height_map::{HeightMapConfig, read_height_map, write_height_map};
 pub use inspect::{CaptureReport, FileReport, StationReport, TableReport, inspect};
 pub use measurement::{

@@ -3,18 +3,23 @@
 
 use std::{
     ffi::{CString, c_char},
+    ops::Range,
     sync::Once,
 };
 
-use hdf5_metno::{Datatype, Group, plist::DatasetCreate, sync::sync};
+use hdf5_metno::{Dataset, Datatype, Group, plist::DatasetCreate, sync::sync};
 use hdf5_metno_sys::{
+    h5::hsize_t,
+    h5d::H5Dread,
     h5l::H5Lget_val,
     h5p::{H5P_DEFAULT, H5Pget_virtual_count, H5Pget_virtual_dsetname, H5Pget_virtual_filename},
     h5pl::H5PLset_loading_state,
+    h5s::{H5S_seloper_t, H5Sclose, H5Screate_simple, H5Sselect_hyperslab},
     h5t::{
-        H5T_IEEE_F32BE, H5T_IEEE_F32LE, H5T_IEEE_F64BE, H5T_IEEE_F64LE, H5T_STD_I8BE, H5T_STD_I8LE, H5T_STD_I16BE,
-        H5T_STD_I16LE, H5T_STD_I32BE, H5T_STD_I32LE, H5T_STD_I64BE, H5T_STD_I64LE, H5T_STD_U8BE, H5T_STD_U8LE,
-        H5T_STD_U16BE, H5T_STD_U16LE, H5T_STD_U32BE, H5T_STD_U32LE, H5T_STD_U64BE, H5T_STD_U64LE, H5Tequal,
+        H5T_IEEE_F32BE, H5T_IEEE_F32LE, H5T_IEEE_F64BE, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, H5T_STD_I8BE, H5T_STD_I8LE,
+        H5T_STD_I16BE, H5T_STD_I16LE, H5T_STD_I32BE, H5T_STD_I32LE, H5T_STD_I64BE, H5T_STD_I64LE, H5T_STD_U8BE,
+        H5T_STD_U8LE, H5T_STD_U16BE, H5T_STD_U16LE, H5T_STD_U32BE, H5T_STD_U32LE, H5T_STD_U64BE, H5T_STD_U64LE,
+        H5T_class_t, H5Tclose, H5Tcreate, H5Tequal, H5Tinsert,
     },
 };
 
@@ -90,4 +95,37 @@ pub(crate) fn virtual_sources(settings: &DatasetCreate) -> Option<Vec<(String, S
     };
     let source = |index| Some((name(H5Pget_virtual_filename, index)?, name(H5Pget_virtual_dsetname, index)?));
     (status >= 0).then(|| (0..count).map(source).collect())?
+}
+
+/// Numbers of one field of the records of a dataset of one dimension, as f64; `None` where they cannot be read.
+pub(crate) fn read_field(dataset: &Dataset, field: &str, range: Range<usize>) -> Option<Vec<f64>> {
+    let name = CString::new(field).ok()?;
+    let (start, count) = ([range.start as hsize_t], [range.len() as hsize_t]);
+    let mut values = vec![0_f64; range.len()];
+    let space = dataset.space().ok()?;
+    // SAFETY: all identifiers are made here or live in the dataset and its space; the type in memory has one number of eight bytes a
+    // record, and the buffer as many numbers as are selected. Everything is done under the library's lock, and closed before it ends.
+    let status = sync(|| unsafe {
+        let record = H5Tcreate(H5T_class_t::H5T_COMPOUND, size_of::<f64>());
+        let memory = H5Screate_simple(1, count.as_ptr(), std::ptr::null());
+        let mut status = H5Tinsert(record, name.as_ptr(), 0, *H5T_NATIVE_DOUBLE);
+        if status >= 0 {
+            let chosen = H5S_seloper_t::H5S_SELECT_SET;
+            status = H5Sselect_hyperslab(
+                space.id(),
+                chosen,
+                start.as_ptr(),
+                std::ptr::null(),
+                count.as_ptr(),
+                std::ptr::null(),
+            );
+        }
+        if status >= 0 {
+            status = H5Dread(dataset.id(), record, memory, space.id(), H5P_DEFAULT, values.as_mut_ptr().cast());
+        }
+        H5Sclose(memory);
+        H5Tclose(record);
+        status
+    });
+    (status >= 0).then_some(values)
 }

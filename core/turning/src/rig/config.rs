@@ -222,6 +222,7 @@ impl RigConfig {
                 section,
                 axial_radius_mm,
                 sign: f64::from(sensor.sign),
+                unit: sensor.unit,
                 calibration,
             };
             if let Some(first) = sensors.iter().find(|other: &&Sensor| other.section == section)

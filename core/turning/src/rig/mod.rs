@@ -80,6 +80,8 @@ pub struct Sensor {
     pub axial_radius_mm: Option<f64>,
     /// +1 or −1.
     pub sign: f64,
+    /// Unit of its numbers.
+    pub unit: Unit,
     /// From its numbers to displacements. Loaders give numbers with their sign; the pipeline calibrates them.
     pub calibration: Calibration,
 }

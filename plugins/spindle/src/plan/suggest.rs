@@ -5,7 +5,7 @@ use std::{
     ops::RangeInclusive,
 };
 
-use runout_core::rig::{Calibration, Rig, Sensor, Setup};
+use runout_core::rig::{Calibration, Rig, Sensor, Setup, Unit};
 
 use super::{
     gain::{Criterion, FormGain, Score},
@@ -132,7 +132,8 @@ impl Addition {
                 let id = "added".into();
                 let (angle_rad, calibration) = (angle_deg.to_radians(), Calibration::NONE);
                 let axial_radius_mm = rig.faces[section];
-                rig.sensors.push(Sensor { id, angle_rad, z_mm, section, axial_radius_mm, sign: 1.0, calibration });
+                let (sign, unit) = (1.0, Unit::default());
+                rig.sensors.push(Sensor { id, angle_rad, z_mm, section, axial_radius_mm, sign, unit, calibration });
             }
         }
         Some(rig)

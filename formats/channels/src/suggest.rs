@@ -1,0 +1,223 @@
+//! What a file holds, and a `[load]` table to start from.
+
+use std::{collections::BTreeMap, fmt::Write as _, path::Path, sync::Arc};
+
+use runout_core::{Result, input_file::InputFile};
+use serde::Serialize;
+
+use crate::{
+    capture::{BLOCK, is_time},
+    channel::{Channel, ChannelFile, Samples},
+    formats,
+    unit::{self, Known},
+};
+
+/// Readings that are shown of each channel.
+const SHOWN: usize = 5;
+/// Samples of a channel that are looked at for marks.
+const LOOKED_AT: usize = 1 << 18;
+/// Channels whose samples are looked at.
+const MOST_CHANNELS: usize = 256;
+/// Share of samples that are low or high in a trace of pulses.
+const PULSES: f64 = 0.9;
+/// Share of the range within which a sample is low or high.
+const LEVEL: f64 = 0.2;
+/// Names of setups that a rig of a reversal has.
+const SETUPS: [&str; 2] = ["initial", "reversed"];
+
+/// What a file of named channels holds.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ChannelsReport {
+    /// Name of the format: "tdms".
+    pub format: &'static str,
+    /// The channels, in the file's order.
+    pub channels: Vec<ChannelReport>,
+    /// Path of the channel that looks like the once-per-turn mark or the encoder.
+    pub mark: Option<String>,
+    /// A `[load]` table to start from.
+    pub load: String,
+    /// What a reader should know of the file.
+    pub remarks: Vec<String>,
+}
+
+/// A channel and its first readings.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ChannelReport {
+    /// What the file says of it.
+    #[serde(flatten)]
+    pub channel: Channel,
+    /// Its first readings.
+    pub first: Vec<f64>,
+}
+
+/// How a channel tells the angle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Turning {
+    Pulses { threshold: f64, hysteresis: f64 },
+    Angle,
+}
+
+/// Looks into a file; nothing where it is of none of the formats.
+///
+/// # Errors
+/// When it is of one of them and damaged, or cannot be read.
+pub fn inspect(path: &Path) -> Result<Option<ChannelsReport>> {
+    let input = InputFile::new(path)?;
+    let Ok(format) = formats::format_of(&input, None) else { return Ok(None) };
+    let file: Arc<dyn ChannelFile> = formats::open(&input, Some(format.name))?.into();
+    let mut channels = Vec::with_capacity(file.channels().len());
+    let mut turning: Vec<Option<Turning>> = Vec::new();
+    for (index, channel) in file.channels().iter().enumerate() {
+        let wanted = if index < MOST_CHANNELS { LOOKED_AT } else { 0 };
+        let values = if channel.kind.is_number() { beginning(&*file, index, wanted)? } else { Vec::new() };
+        turning.push(if is_time(channel) { None } else { turning_of(channel, &values) });
+        channels.push(ChannelReport { channel: channel.clone(), first: values.into_iter().take(SHOWN).collect() });
+    }
+    let mark = best_mark(file.channels(), &turning);
+    let name = path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+    let load = table(&name, file.channels(), mark.map(|(index, turning)| (&file.channels()[index], turning)));
+    let mark = mark.map(|(index, _)| file.channels()[index].path());
+    Ok(Some(ChannelsReport { format: format.name, channels, mark, load, remarks: file.remarks() }))
+}
+
+fn beginning(file: &dyn ChannelFile, index: usize, wanted: usize) -> Result<Vec<f64>> {
+    let mut column = [Vec::new()];
+    let mut samples: Box<dyn Samples> = file.read(&[index])?;
+    while column[0].len() < wanted && samples.next(BLOCK.min(wanted), &mut column)? > 0 {}
+    let [values] = column;
+    Ok(values)
+}
+
+/// Of all that look like marks, one that is named like one, or else the first.
+fn best_mark(channels: &[Channel], turning: &[Option<Turning>]) -> Option<(usize, Turning)> {
+    let found = || turning.iter().enumerate().filter_map(|(index, turning)| Some((index, (*turning)?)));
+    found().find(|(index, _)| is_mark(&channels[*index].name)).or_else(|| found().next())
+}
+
+/// Whether a name is one of marks and encoders.
+fn is_mark(name: &str) -> bool {
+    let name = name.to_lowercase();
+    ["index", "mark", "trig", "tach", "key", "once", "enc", "angle", "winkel", "pulse", "z-"]
+        .iter()
+        .any(|word| name.contains(word))
+}
+
+/// How a channel tells the angle, by its name's and unit's hint and its samples.
+fn turning_of(channel: &Channel, values: &[f64]) -> Option<Turning> {
+    if values.len() < 16 || values.iter().any(|value| !value.is_finite()) {
+        return None;
+    }
+    let (low, high) = values
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(*value), high.max(*value)));
+    let range = high - low;
+    if range <= 0.0 {
+        return None;
+    }
+    let is_angle = matches!(channel.unit.as_deref().and_then(unit::known), Some(Known::Turns(_)));
+    let steps = values.windows(2).map(|pair| pair[1] - pair[0]);
+    let (mut up, mut down) = (0_usize, 0_usize);
+    for step in steps {
+        up += usize::from(step > 0.0);
+        down += usize::from(step < 0.0);
+    }
+    // A saw tooth falls once a turn; an unwrapped angle never.
+    let is_saw = up.min(down) * 16 <= up.max(down) && up + down > values.len() / 4;
+    if is_saw && (is_angle || is_mark(&channel.name)) {
+        return Some(Turning::Angle);
+    }
+    let level = |value: &f64| {
+        let share = (value - low) / range;
+        if share < LEVEL { Some(false) } else { (share > 1.0 - LEVEL).then_some(true) }
+    };
+    let levels: Vec<bool> = values.iter().filter_map(level).collect();
+    let rises = levels.windows(2).filter(|pair| !pair[0] && pair[1]).count();
+    let is_trace = levels.len() as f64 >= PULSES * values.len() as f64 && rises >= 2;
+    is_trace.then(|| Turning::Pulses { threshold: rounded(low + 0.5 * range), hysteresis: rounded(0.25 * range) })
+}
+
+/// Three digits, as a person would state a threshold.
+fn rounded(value: f64) -> f64 {
+    format!("{value:.2e}").parse().unwrap_or(value)
+}
+
+/// The table for the file.
+fn table(file: &str, channels: &[Channel], mark: Option<(&Channel, Turning)>) -> String {
+    let mut text = format!("[load]\nplugin = \"channels\"\npath = {}\n", quoted(file));
+    let is_sensor = |channel: &&Channel| {
+        channel.kind.is_number()
+            && channel.samples > 1
+            && !is_time(channel)
+            && mark.is_none_or(|(mark, _)| mark.name != channel.name)
+    };
+    let sensors: Vec<&Channel> = channels.iter().filter(is_sensor).collect();
+    // Channels that one group has are those of all: setups have the same.
+    let mut groups: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
+    let mut order = Vec::new();
+    for channel in &sensors {
+        let names = groups.entry(&channel.group).or_default();
+        if names.is_empty() {
+            order.push(channel.group.as_str());
+        }
+        names.push(&channel.name);
+    }
+    let first = order.first().copied().unwrap_or_default();
+    let names = groups.get(first).cloned().unwrap_or_default();
+    let alike: Vec<&str> = order.iter().copied().filter(|group| groups.get(group) == Some(&names)).collect();
+    if alike.len() > 1 {
+        let id = |number: usize| {
+            SETUPS
+                .get(number)
+                .filter(|_| alike.len() == 2)
+                .map_or_else(|| format!("setup-{}", number + 1), |id| (*id).to_owned())
+        };
+        let entries: Vec<String> = alike
+            .iter()
+            .enumerate()
+            .map(|(number, group)| format!("{} = {}", key(&id(number)), quoted(group)))
+            .collect();
+        let _ = writeln!(text, "setups = {{ {} }}", entries.join(", "));
+    }
+    let is_unique = |name: &str| sensors.iter().filter(|channel| channel.name == name).count() == 1;
+    let path = |name: &str| {
+        if alike.len() > 1 || first.is_empty() || is_unique(name) { name.to_owned() } else { format!("{first}/{name}") }
+    };
+    let entries: Vec<String> =
+        names.iter().enumerate().map(|(number, name)| format!("S{} = {}", number + 1, quoted(&path(name)))).collect();
+    let _ = writeln!(text, "channels = {{ {} }}", entries.join(", "));
+    match mark {
+        Some((mark, Turning::Angle)) => {
+            let unit = mark.unit.clone().filter(|unit| unit::known(unit).is_some()).unwrap_or_else(|| "deg".into());
+            let _ = writeln!(text, "angle = {{ channel = {}, unit = {} }}", quoted(&mark.name), quoted(&unit));
+        }
+        Some((mark, Turning::Pulses { threshold, hysteresis })) => {
+            let _ = writeln!(
+                text,
+                "marker = {{ channel = {}, threshold = {threshold:?}, hysteresis = {hysteresis:?}, edge = \"rising\" }}",
+                quoted(&mark.name)
+            );
+        }
+        None => text.push_str("# the channel of the once-per-turn mark was not found: marker = { channel = \"…\" }\n"),
+    }
+    let of_group = || sensors.iter().filter(|channel| channel.group == first);
+    if of_group().any(|channel| channel.unit.as_deref().and_then(unit::known).is_none()) {
+        text.push_str("# the file has no unit for all of them; write theirs\nunit = \"um\"\n");
+    }
+    let has_time = channels.iter().any(|channel| channel.group == first && is_time(channel));
+    if !has_time && of_group().any(|channel| channel.rate_hz.is_none()) {
+        text.push_str("# the file has no sampling rate; write yours\n# sample_rate_hz = 5120\n");
+    }
+    text
+}
+
+/// A key of TOML.
+fn key(name: &str) -> String {
+    let is_bare =
+        !name.is_empty() && name.bytes().all(|byte| byte.is_ascii_alphanumeric() || matches!(byte, b'_' | b'-'));
+    if is_bare { name.to_owned() } else { quoted(name) }
+}
+
+/// A text of TOML.
+fn quoted(text: &str) -> String {
+    toml::Value::String(text.to_owned()).to_string()
+}

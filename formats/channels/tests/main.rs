@@ -1,0 +1,9 @@
+//! The formats of named channels: against their reference libraries, and all by one suite.
+#![allow(clippy::unwrap_used, reason = "tests")]
+
+mod conformance;
+mod mutations;
+mod real_files;
+mod references;
+mod support;
+mod turns;
