@@ -8,6 +8,7 @@ pub fn registry() -> Registry {
     let mut registry = Registry::default();
     for register in [
         runout_hdf5::register,
+        runout_maps::register,
         runout_csv::register,
         runout_points::register,
         runout_preprocess::register,

@@ -21,6 +21,7 @@
 pub mod atomic_file;
 pub mod effects;
 pub mod height_grid;
+pub mod length_unit;
 pub mod pipeline;
 pub mod points;
 pub mod stage;
