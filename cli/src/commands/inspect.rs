@@ -10,7 +10,7 @@ use crate::{
     args::InspectArgs,
     failure::Failure,
     render,
-    reports::inspect::{ColumnReport, Report, TableReport},
+    reports::inspect::{ColumnReport, MapReport, Report, TableReport},
 };
 
 /// Says what a file holds, by its first bytes and not by its name.
@@ -37,10 +37,14 @@ pub(crate) fn report(path: &Path) -> Result<Report> {
     if signature.starts_with(b"PAR1") {
         return table(path).map(Report::Parquet);
     }
+    if runout_maps::is_map(path)? {
+        let map = runout_maps::read(path, &runout_maps::Wanted::default())?;
+        return Ok(Report::Map(MapReport::new(map)));
+    }
     if let Some(text) = runout_csv::inspect(path)? {
         return Ok(Report::Text(text));
     }
-    let problem = "it is neither HDF5 nor Parquet, nor a table as text";
+    let problem = "it is neither HDF5 nor Parquet, no height map (X3P, SDF, SUR), nor a table as text";
     Err(Error::new("inspect", path.display().to_string(), problem)
         .of(ErrorKind::DamagedData)
         .help(

@@ -20,7 +20,7 @@ pub struct AsMeasuredConfig {
     /// point stays.
     #[serde(default)]
     pub outlier_mad: Option<f64>,
-    /// Form that is removed by least squares, of a height map or a profile; without it the plane or the line alone.
+    /// Form that is removed by least squares, of a height map or a profile; without it the plane, or the line of a profile.
     #[serde(default)]
     pub form: Option<FormRemoval>,
     /// Degree of `form = "polynomial"`, 1 to 8; without it 2.
@@ -115,7 +115,7 @@ impl AsMeasuredConfig {
         let refused = if is_round { plane_keys.as_slice() } else { round_keys.as_slice() };
         if let Some((key, _)) = refused.iter().find(|(_, is_there)| *is_there) {
             let of = if is_round { "height maps and profiles" } else { "circles and cylinders" };
-            return Err(Fault::at(key, format!("this is a key of {of}")).help("`object` says what the points are of"));
+            return Err(Fault::at(*key, format!("this is a key of {of}")).help("`object` says what the points are of"));
         }
         if self.voids == Voids::Fill && self.object != Object::HeightMap {
             return Err(Fault::at("voids", "only voids of a height map are filled"));
@@ -134,7 +134,8 @@ impl AsMeasuredConfig {
         }
         for (key, ends) in self.crop.iter().flat_map(|crop| [("x_mm", crop.x_mm), ("y_mm", crop.y_mm)]) {
             if let Some([from, to]) = ends.filter(|[from, to]| !(from.is_finite() && to.is_finite() && from < to)) {
-                return Err(Fault::at(key, format!("expected [from, to] with from below to, found [{from}, {to}]")).under("crop"));
+                return Err(Fault::at(key, format!("expected [from, to] with from below to, found [{from}, {to}]"))
+                    .under("crop"));
             }
         }
         if self.object == Object::Profile && self.crop.is_some_and(|crop| crop.y_mm.is_some()) {

@@ -24,7 +24,12 @@ pub(crate) fn outliers(heights: &[f64], columns: usize, mads: f64) -> Vec<bool> 
             for near in row.saturating_sub(REACH)..(row + REACH + 1).min(rows) {
                 let line = &heights[near * columns..(near + 1) * columns];
                 let near_columns = column.saturating_sub(across)..(column + across + 1).min(columns);
-                beside.extend(near_columns.filter(|other| near != row || *other != column).map(|other| line[other]).filter(|height| height.is_finite()));
+                beside.extend(
+                    near_columns
+                        .filter(|other| near != row || *other != column)
+                        .map(|other| line[other])
+                        .filter(|height| height.is_finite()),
+                );
             }
             if beside.len() >= FEWEST {
                 differences[place] = heights[place] - median(beside.iter().copied());

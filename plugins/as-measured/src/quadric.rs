@@ -36,7 +36,8 @@ impl Quadric {
     pub(crate) fn fit(shape: Shape, points_mm: &[[f64; 3]]) -> Option<Self> {
         let count = points_mm.len() as f64;
         let middle_mm = [0, 1].map(|axis| points_mm.iter().map(|point| point[axis]).sum::<f64>() / count);
-        let reach = |axis: usize| points_mm.iter().map(|point| (point[axis] - middle_mm[axis]).abs()).fold(0.0, f64::max);
+        let reach =
+            |axis: usize| points_mm.iter().map(|point| (point[axis] - middle_mm[axis]).abs()).fold(0.0, f64::max);
         let reach_mm = reach(0).max(reach(1));
         let parameters = start(shape, points_mm, middle_mm, reach_mm)?;
         let mut fitted = Self { shape, middle_mm, parameters };
@@ -70,11 +71,17 @@ impl Quadric {
             let mut settled = true;
             for _ in 0..STEPS {
                 let mut damped = normal.clone();
+                // A flat cylinder has an axis in any direction.
+                let least = 1e-15 * normal.diagonal().max();
                 for place in 0..scales.len() {
-                    damped[(place, place)] *= 1.0 + damping;
+                    damped[(place, place)] += damping * damped[(place, place)] + least;
                 }
                 let step = damped.cholesky()?.solve(&right);
-                let moved = self.parameters.iter().zip(step.iter().zip(&scales)).map(|(value, (step, scale))| value + step * scale);
+                let moved = self
+                    .parameters
+                    .iter()
+                    .zip(step.iter().zip(&scales))
+                    .map(|(value, (step, scale))| value + step * scale);
                 let next = Self { parameters: moved.collect(), ..self.clone() };
                 let next_sum = next.sum(points_mm);
                 if next_sum <= sum {
@@ -137,7 +144,9 @@ fn height(shape: Shape, parameters: &[f64], x: f64, y: f64) -> f64 {
     let (level, [slope_x, slope_y], curvature, axis) = match (shape, parameters) {
         (Shape::Circle, &[level, slope, curvature]) => (level, [slope, 0.0], curvature, None),
         (Shape::Sphere, &[level, slope_x, slope_y, curvature]) => (level, [slope_x, slope_y], curvature, None),
-        (Shape::Cylinder, &[level, slope_x, slope_y, curvature, axis]) => (level, [slope_x, slope_y], curvature, Some(axis)),
+        (Shape::Cylinder, &[level, slope_x, slope_y, curvature, axis]) => {
+            (level, [slope_x, slope_y], curvature, Some(axis))
+        }
         _ => return f64::NAN,
     };
     let up = 1.0 / (1.0 + slope_x * slope_x + slope_y * slope_y).sqrt();
@@ -180,7 +189,13 @@ fn start(shape: Shape, points_mm: &[[f64; 3]], middle_mm: [f64; 2], reach_mm: f6
             let bends = nalgebra::Matrix2::new(found[3], 0.5 * found[4], 0.5 * found[4], found[5]).symmetric_eigen();
             let steep = usize::from(bends.eigenvalues[1].abs() > bends.eigenvalues[0].abs());
             let axis = bends.eigenvectors.column(1 - steep).into_owned();
-            vec![found[0], found[1] * slope, found[2] * slope, -2.0 * bends.eigenvalues[steep] * bend, axis[1].atan2(axis[0])]
+            vec![
+                found[0],
+                found[1] * slope,
+                found[2] * slope,
+                -2.0 * bends.eigenvalues[steep] * bend,
+                axis[1].atan2(axis[0]),
+            ]
         }
     })
 }
@@ -192,7 +207,8 @@ mod tests {
     use super::*;
 
     fn grid(height: impl Fn(f64, f64) -> f64) -> Vec<[f64; 3]> {
-        let nodes = (0..41).flat_map(|row| (0..51).map(move |column| [0.1 * f64::from(column) + 3.0, 0.1 * f64::from(row) - 7.0]));
+        let nodes = (0..41)
+            .flat_map(|row| (0..51).map(move |column| [0.1 * f64::from(column) + 3.0, 0.1 * f64::from(row) - 7.0]));
         nodes.map(|[x, y]| [x, y, height(x, y)]).collect()
     }
 
@@ -225,7 +241,10 @@ mod tests {
         assert!(left(&found, &hollow) < 1e-10, "{}", left(&found, &hollow));
         assert!((1.0 / found.curvature() + 8.0).abs() < 1e-6, "{found:?}");
         assert!((found.axis_deg().unwrap() - 30.0).abs() < 0.3, "{found:?}");
-        let circle: Vec<[f64; 3]> = (0..100).map(|place| f64::from(place) * 0.05).map(|x| [x, 0.0, (25.0 - (x - 1.0).powi(2)).sqrt()]).collect();
+        let circle: Vec<[f64; 3]> = (0..100)
+            .map(|place| f64::from(place) * 0.05)
+            .map(|x| [x, 0.0, (25.0 - (x - 1.0).powi(2)).sqrt()])
+            .collect();
         let found = Quadric::fit(Shape::Circle, &circle).unwrap();
         assert!(left(&found, &circle) < 1e-11 && (1.0 / found.curvature() - 5.0).abs() < 1e-8);
     }
