@@ -59,7 +59,7 @@ pub(crate) fn read(input: &Input, wanted: &Wanted) -> Result<Map> {
     let mut objects = vec![first];
     let mut remarks = Vec::new();
     while objects.len() < declared.min(MOST_OBJECTS) {
-        let end = objects.last().map_or(0, |last| last.data + last.bytes);
+        let end = objects.last().map_or(0, |last| last.data.saturating_add(last.bytes));
         let Ok((next, _)) = object(&mut file, end, shown) else {
             remarks.push(format!("it declares {declared} objects, and {} could be read", objects.len()));
             break;

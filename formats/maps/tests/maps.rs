@@ -157,7 +157,7 @@ fn damaged_files_are_read_or_refused() {
         state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (state >> 33) as usize % below.max(1)
     };
-    let rounds = std::env::var("RUNOUT_MUTATIONS").ok().and_then(|text| text.parse().ok()).unwrap_or(40);
+    let rounds = std::env::var("RUNOUT_MUTATIONS").ok().and_then(|text| text.parse().ok()).unwrap_or(100);
     let (mut refused, mut all, mut largest) = (0_usize, 0_usize, 0);
     let mut files: Vec<PathBuf> = fs::read_dir(data()).unwrap().map(|entry| entry.unwrap().path()).collect();
     files.retain(|file| !file.ends_with("expected.json"));

@@ -85,8 +85,9 @@ fn sections(z_mm: &[f64], radius_mm: f64) -> std::result::Result<(Vec<usize>, Ve
         return Ok((order, vec![whole("circle")]));
     }
     order.sort_by(|one, other| z_mm[*one].total_cmp(&z_mm[*other]));
+    let apart_mm = (range / MOST_SECTIONS).max(0.1 * LEVEL * radius_mm);
     let breaks: Vec<usize> =
-        (1..order.len()).filter(|place| z_mm[order[*place]] - z_mm[order[place - 1]] > range / MOST_SECTIONS).collect();
+        (1..order.len()).filter(|place| z_mm[order[*place]] - z_mm[order[place - 1]] > apart_mm).collect();
     if breaks.is_empty() {
         let steps = z_mm.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| step.abs() > 0.0);
         let [up, down] =
