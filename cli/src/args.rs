@@ -43,8 +43,10 @@ pub(crate) enum Command {
     Plugins(PluginsArgs),
     /// Print JSON Schemas of configurations and results.
     Schema(SchemaArgs),
-    /// Say what a file holds (HDF5, Parquet).
+    /// Say what a file holds (HDF5, Parquet, CSV, X3P, SDF, SUR).
     Inspect(InspectArgs),
+    /// Write a height map or a profile in another format (X3P, SDF, HDF5).
+    Convert(ConvertArgs),
     /// Print the completion script of a shell.
     Completions(CompletionsArgs),
 }
@@ -275,6 +277,24 @@ pub(crate) struct SchemaArgs {
 pub(crate) struct InspectArgs {
     /// A measurement, a result or a table.
     pub file: PathBuf,
+}
+
+/// `runout convert`.
+#[derive(Debug, Args)]
+pub(crate) struct ConvertArgs {
+    /// A height map or a profile: X3P, SDF, SUR, HDF5 (runout-surface), text.
+    pub input: PathBuf,
+    /// The file to write; its ending says the format: .x3p, .sdf, .h5.
+    pub output: PathBuf,
+    /// Name or number, from 1, of the map in a file that holds several.
+    #[arg(long)]
+    pub layer: Option<String>,
+    /// Unit of heights of a file that names none (of text of its coordinates too): m, mm, um, nm.
+    #[arg(long)]
+    pub unit: Option<String>,
+    /// Distance of columns (and rows) of a matrix as text, in mm.
+    #[arg(long, value_name = "MM", num_args = 1..=2)]
+    pub step_mm: Vec<f64>,
 }
 
 /// `runout report`.

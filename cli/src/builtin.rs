@@ -8,6 +8,7 @@ pub fn registry() -> Registry {
     let mut registry = Registry::default();
     for register in [
         runout_hdf5::register,
+        runout_maps::register,
         runout_csv::register,
         runout_channels::register,
         runout_points::register,
@@ -21,6 +22,7 @@ pub fn registry() -> Registry {
         runout_rotor::register,
         runout_spatial_error::register,
         runout_fly_cutting::register,
+        runout_as_measured::register,
         runout_parquet::register,
         runout_gltf::register,
         runout_obj::register,

@@ -10,7 +10,7 @@ use crate::{
     args::InspectArgs,
     failure::Failure,
     render,
-    reports::inspect::{ColumnReport, Report, TableReport},
+    reports::inspect::{ColumnReport, MapReport, Report, TableReport},
 };
 
 /// Says what a file holds, by its first bytes and not by its name.
@@ -46,6 +46,10 @@ pub(crate) fn report(path: &Path) -> Result<Report> {
         }
         return Ok(channels(path)?.unwrap_or(Report::Parquet(report)));
     }
+    if runout_maps::is_map(path)? {
+        let map = runout_maps::read(path, &runout_maps::Wanted::default())?;
+        return Ok(Report::Map(MapReport::new(map)));
+    }
     if let Some(text) = runout_csv::inspect(path)?
         && text.angle_by.is_some()
     {
@@ -61,7 +65,7 @@ pub(crate) fn report(path: &Path) -> Result<Report> {
     Err(Error::new("inspect", path.display().to_string(), problem)
         .of(ErrorKind::DamagedData)
         .help(
-            "inspect reads measurement files, results, recordings of named channels (TDMS, MAT, HDF5, LVM, NumPy, Parquet, Arrow, UFF, WAV) and CSV files with a header. Columns of CSV files are delimited by comma, \
+            "inspect reads measurement files, results, recordings of named channels (TDMS, MAT, HDF5, LVM, NumPy, Parquet, Arrow, UFF, WAV), height maps (X3P, SDF, SUR) and CSV files with a header. Columns of CSV files are delimited by comma, \
              semicolon or tab (those of numbers with decimal commas by semicolon or tab), and lines before the header begin with `#`",
         ))
 }

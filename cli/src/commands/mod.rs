@@ -4,6 +4,7 @@ pub(crate) mod batch;
 pub(crate) mod check;
 pub(crate) mod compare;
 pub(crate) mod completions;
+pub(crate) mod convert;
 pub(crate) mod diagnose;
 pub(crate) mod inspect;
 pub(crate) mod plan;
@@ -38,6 +39,7 @@ pub(crate) fn execute(command: Command, json: bool, registry: &Registry) -> Resu
         Command::Plugins(args) => plugins::execute(&args, json, registry),
         Command::Schema(args) => schema::execute(&args, json, registry),
         Command::Inspect(args) => inspect::execute(&args, json),
+        Command::Convert(args) => convert::execute(&args, json),
         Command::Report(args) => report::execute(&args, json),
         Command::Completions(args) => completions::execute(&args, json),
     }

@@ -9,7 +9,7 @@ use super::{
     page::Page,
     table::Table,
 };
-use crate::reports::inspect::{Report, TableReport};
+use crate::reports::inspect::{ConvertReport, MapReport, Report, TableReport};
 
 /// The text of a report.
 #[must_use]
@@ -20,8 +20,38 @@ pub(crate) fn text(report: &Report) -> String {
         Report::Parquet(table) => parquet(&mut page, table),
         Report::Text(table) => csv(&mut page, table),
         Report::Channels(file) => channels(&mut page, file),
+        Report::Map(found) => {
+            map(&mut page, found);
+            page.line("  in a pipeline: load = { plugin = \"height-map\", path = … }, separate = { plugin = \"as-measured\" }");
+        }
     }
     page.into_text()
+}
+
+/// What `runout convert` did.
+#[must_use]
+pub(crate) fn converted(report: &ConvertReport) -> String {
+    let mut page = Page::default();
+    map(&mut page, &report.input);
+    page.line(format_args!("  written: {}", report.output.display()));
+    page.bullets("What the written file does not hold", &report.lost);
+    page.into_text()
+}
+
+fn map(page: &mut Page, map: &MapReport) {
+    let [low, high] = map.height_nm.map(|height| significant(1e-3 * height, 6));
+    let [step_x, step_y] = map.step_mm.map(|step| significant(step, 6));
+    let what = if map.rows == 1 { "profile" } else { "height map" };
+    page.line(format_args!("{}, {what} of {} rows and {} columns", map.format, map.rows, map.columns));
+    page.line(format_args!("  steps: {step_x} mm along x, {step_y} mm along y"));
+    page.line(format_args!("  heights: {low} to {high} µm, {} points without one", map.voids));
+    if map.layers.len() > 1 {
+        page.line(format_args!("  maps in the file: {}", map.layers.join(", ")));
+    }
+    for (name, value) in &map.about {
+        page.line(format_args!("  {name}: {value}"));
+    }
+    page.warnings(&map.warnings);
 }
 
 fn hdf5(page: &mut Page, file: &FileReport) {

@@ -1,10 +1,11 @@
 //! What `runout inspect` says.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, path::PathBuf};
 
 use runout_channels::ChannelsReport;
 use runout_csv::TextReport;
 use runout_hdf5::FileReport;
+use runout_maps::Map;
 use serde::Serialize;
 
 /// What a file holds.
@@ -19,6 +20,62 @@ pub(crate) enum Report {
     Text(TextReport),
     /// Named channels of other programs.
     Channels(ChannelsReport),
+    /// A height map or a profile.
+    Map(MapReport),
+}
+
+/// A height map of another program.
+#[derive(Debug, Serialize)]
+pub(crate) struct MapReport {
+    /// "X3P", "SDF", "SUR".
+    pub format: &'static str,
+    /// Points along y; 1 of a profile.
+    pub rows: usize,
+    /// Points along x.
+    pub columns: usize,
+    /// Distance of columns and of rows.
+    pub step_mm: [f64; 2],
+    /// Points without a height.
+    pub voids: usize,
+    /// Lowest and highest height.
+    pub height_nm: [f64; 2],
+    /// Names of the maps in the file.
+    pub layers: Vec<String>,
+    /// What the file says of itself.
+    pub about: BTreeMap<String, String>,
+    /// What the user should know.
+    pub warnings: Vec<String>,
+}
+
+impl MapReport {
+    pub(crate) fn new(map: Map) -> Self {
+        let grid = &map.grid;
+        let known = grid.height_nm.iter().filter(|height| height.is_finite());
+        let height_nm =
+            known.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], height| [low.min(*height), high.max(*height)]);
+        Self {
+            format: map.format,
+            rows: grid.rows(),
+            columns: grid.columns,
+            step_mm: [grid.step_x_mm, grid.step_y_mm],
+            voids: grid.holes(),
+            height_nm,
+            layers: map.layers,
+            about: map.about.into_iter().collect(),
+            warnings: map.remarks,
+        }
+    }
+}
+
+/// What `runout convert` did.
+#[derive(Debug, Serialize)]
+pub(crate) struct ConvertReport {
+    /// What was read.
+    pub input: MapReport,
+    /// The file that was written.
+    pub output: PathBuf,
+    /// What it does not hold, in words.
+    pub lost: Vec<String>,
 }
 
 /// A Parquet table in short.

@@ -136,6 +136,16 @@ fn rotor() -> Domain {
     Domain { name: "rotor", pipeline: pipeline.into(), files: vec![("spindle.toml", ROTOR.into())], has_surface: false }
 }
 
+fn as_measured() -> Domain {
+    let mut points = String::from("x_mm,y_mm,height_um\n");
+    for (row, column) in (0..40).flat_map(|row| (0..50).map(move |column| (row, column))) {
+        let height = f64::from((row * 31 + column * 17) % 23) * 0.02;
+        writeln!(points, "{},{},{height}", 0.01 * f64::from(column), 0.02 * f64::from(row)).unwrap();
+    }
+    let pipeline = "[load]\nplugin = 'points'\npath = 'map.csv'\n[separate]\nplugin = 'as-measured'\n";
+    Domain { name: "as-measured", pipeline: pipeline.into(), files: vec![("map.csv", points)], has_surface: true }
+}
+
 fn without_exports(pipeline: &str) -> String {
     pipeline.split("[[export]]").next().unwrap_or_default().to_owned()
 }
@@ -147,6 +157,8 @@ fn table(exporter: &str, folder: &str) -> String {
         "report" => "/report.html",
         "gltf" => "/part.glb",
         "obj" => "/part.obj",
+        "x3p" => "/part.x3p",
+        "sdf" => "/part.sdf",
         _ => "",
     };
     format!("[[export]]\nplugin = '{exporter}'\npath = '{folder}{file}'\n")
@@ -171,6 +183,7 @@ fn every_exporter_writes_every_domain_or_is_refused_in_words() {
         touch_probe(),
         spatial_error(),
         fly_cutting(),
+        as_measured(),
         rotor(),
     ];
     for Domain { name, pipeline: text, files, has_surface } in domains {
@@ -187,8 +200,8 @@ fn every_exporter_writes_every_domain_or_is_refused_in_words() {
                 Ok(_) => tables.push_str(&table(exporter, "out")),
                 Err(error) => {
                     let ConfigError::Text(diagnostic) = error else { panic!("{name}, {exporter}: {error}") };
-                    let is_mesh = ["gltf", "obj"].contains(exporter);
-                    assert!(is_mesh && !has_surface, "{name}, {exporter}: {diagnostic}");
+                    let is_surface = ["gltf", "obj", "x3p", "sdf"].contains(exporter);
+                    assert!(is_surface && !has_surface, "{name}, {exporter}: {diagnostic}");
                     assert!(diagnostic.message.contains("form along an axis or a height map"), "{name}: {diagnostic}");
                     assert!(diagnostic.help.is_some(), "{name}, {exporter}");
                 }

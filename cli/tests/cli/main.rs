@@ -11,6 +11,7 @@ mod every_exporter;
 mod figures;
 mod folder;
 mod lost_orders;
+mod maps;
 mod measured;
 mod odd_files;
 mod one_line;

@@ -104,11 +104,27 @@ pub struct OpenProfile {
 
 /// Heights on a plane. Level and tilt are removed with the form, before any value.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct PlaneMap {
     /// What it is of: "measured", "residual". Values have it as `of`, and limits name it as `section`.
     pub of: String,
     /// The heights.
     pub grid: HeightGrid,
+    /// What its heights count from where the domain has removed form: "least-squares sphere removed". `[evaluate.areal] form` then removes more only
+    /// where it is `polynomial`.
+    pub reference: Option<String>,
+    /// Why its values have no uncertainty, in words for the user, where the domain knows more than that errors of a map are stated point by point.
+    pub no_uncertainty: Option<String>,
+    /// Nodes whose height was filled and not measured: they lower the coverage of values.
+    pub filled: usize,
+}
+
+impl PlaneMap {
+    /// A map whose form is not removed.
+    #[must_use]
+    pub fn new(of: impl Into<String>, grid: HeightGrid) -> Self {
+        Self { of: of.into(), grid, reference: None, no_uncertainty: None, filled: 0 }
+    }
 }
 
 /// Motion of an axis of rotation at standing positions.

@@ -296,7 +296,7 @@ fn plane(heights_nm: impl Fn(f64, f64) -> f64) -> PlaneMap {
         std_nm: Some(0.1),
         height_nm: height_nm.collect(),
     };
-    PlaneMap { of: "measured".into(), grid }
+    PlaneMap::new("measured", grid)
 }
 
 fn areal(map: PlaneMap, text: &str) -> Evaluated {

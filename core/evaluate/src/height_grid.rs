@@ -1,5 +1,12 @@
 //! Heights on a plane: what an interferometer gives of a surface.
 
+mod places;
+
+pub use places::GridPlaces;
+
+use runout_error::Result;
+use runout_numerics::height_map::HeightMap;
+
 /// Heights at the nodes of a rectangular grid.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HeightGrid {
@@ -33,6 +40,15 @@ impl HeightGrid {
     #[must_use]
     pub fn holes(&self) -> usize {
         self.height_nm.iter().filter(|height| !height.is_finite()).count()
+    }
+
+    /// Its heights in µm as a map on a plane.
+    ///
+    /// # Errors
+    /// Where it has fewer than two rows, columns or heights.
+    pub fn height_map(&self) -> Result<HeightMap<'static>> {
+        let heights_um: Vec<f64> = self.height_nm.iter().map(|height_nm| 1e-3 * height_nm).collect();
+        HeightMap::new(heights_um, self.columns, self.step_x_mm, self.step_y_mm, false)
     }
 
     /// BLAKE3 in hexadecimal of its numbers as little-endian f64, one after the other: `origin_x_mm`, `origin_y_mm`, `step_x_mm`,

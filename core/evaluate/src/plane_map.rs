@@ -24,11 +24,14 @@ pub(super) fn values(plane: &PlaneMap, evaluate: &Evaluate) -> Result<(Vec<Value
         return Ok((Vec::new(), Vec::new()));
     }
     let (map, remark) = prepared(plane, evaluate)?;
-    let there = 1.0 - map.missing() as f64 / map.heights_um().len() as f64;
+    let filled = plane.filled as f64 / plane.grid.height_nm.len() as f64;
+    let there = 1.0 - filled - map.missing() as f64 / map.heights_um().len() as f64;
     let options = &evaluate.areal;
+    let before = plane.reference.as_deref().map_or(String::new(), |removed| format!("{removed}, "));
     let reference = match options.form {
-        FormRemoval::None => "mean".to_owned(),
-        FormRemoval::Polynomial => format!("polynomial of degree {} removed, mean", options.degree),
+        FormRemoval::Polynomial => format!("{before}polynomial of degree {} removed, mean", options.degree),
+        FormRemoval::None => format!("{before}mean"),
+        _ if plane.reference.is_some() => format!("{before}mean"),
         _ => "least-squares plane removed, mean".to_owned(),
     };
     let standard = |clause: &str| format!("ISO 25178-2:2021, {clause}");
@@ -65,7 +68,7 @@ pub(super) fn values(plane: &PlaneMap, evaluate: &Evaluate) -> Result<(Vec<Value
         reference: label.reference,
         coverage: there,
         uncertainty: None,
-        no_uncertainty: Some(POINT_BY_POINT.into()),
+        no_uncertainty: Some(plane.no_uncertainty.clone().unwrap_or_else(|| POINT_BY_POINT.into())),
         raised_by_noise: None,
         refuted_by: None,
     });
@@ -74,13 +77,12 @@ pub(super) fn values(plane: &PlaneMap, evaluate: &Evaluate) -> Result<(Vec<Value
 
 /// The map without form, filtered, without the edges at which λc lacks a part of its Gaussian; and what is said of these.
 fn prepared(plane: &PlaneMap, evaluate: &Evaluate) -> Result<(HeightMap<'static>, Option<String>)> {
-    let grid = &plane.grid;
-    let heights_um: Vec<f64> = grid.height_nm.iter().map(|height_nm| 1e-3 * height_nm).collect();
-    let map = HeightMap::new(heights_um, grid.columns, grid.step_x_mm, grid.step_y_mm, false)?;
+    let map = plane.grid.height_map()?;
     let options = &evaluate.areal;
     let map = match options.form {
         FormRemoval::None => map,
         FormRemoval::Polynomial => areal::without_polynomial(&map, options.degree)?,
+        _ if plane.reference.is_some() => map,
         _ => areal::without_polynomial(&map, 1)?,
     };
     let map = filtered(map, evaluate);

@@ -20,6 +20,7 @@
 
 pub mod atomic_file;
 pub mod effects;
+pub mod length_unit;
 pub mod pipeline;
 pub mod points;
 pub mod stage;

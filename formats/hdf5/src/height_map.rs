@@ -1,4 +1,4 @@
-//! Height maps: the loader `height-map`, and how a simulated surface is written.
+//! Height maps: how they are read, and how a simulated surface is written.
 //!
 //! ```text
 //! /            format = "runout-surface", version = 1, step_x_mm, step_y_mm, origin_x_mm, origin_y_mm, optionally std_nm
@@ -13,18 +13,7 @@ use std::{
 
 use hdf5_metno::File;
 use ndarray::ArrayView2;
-use runout_core::{
-    Error, Result,
-    atomic_file::PendingFile,
-    fault::Fault,
-    height_grid::HeightGrid,
-    pipeline::{Context, StageConfig},
-    points::Points,
-    provenance,
-    stage::{Loader, Request, Source, SourceKind},
-};
-use schemars::JsonSchema;
-use serde::Deserialize;
+use runout_core::{Result, atomic_file::PendingFile, height_grid::HeightGrid, points::Points, provenance};
 
 use crate::{
     MEASUREMENT_FORMAT, RESULT_FORMAT, SURFACE_FORMAT, VERSION,
@@ -43,55 +32,17 @@ const CHUNK: usize = 256;
 /// Level of deflate: noise in the last digits does not compress better with more.
 const DEFLATE: u8 = 1;
 
-/// `[load] plugin = "height-map"`.
-#[derive(Debug, Clone, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct HeightMapConfig {
-    /// HDF5 file with the root attribute `format = "runout-surface"` and the dataset `height_nm`, relative to the TOML.
-    pub path: PathBuf,
-    /// Follows external links, virtual data sets and data in other files, all of which are then inputs.
-    #[serde(default)]
-    pub follow_links: bool,
-}
-
-impl StageConfig for HeightMapConfig {
-    type Stage = Box<dyn Loader>;
-
-    const NAME: &'static str = "height-map";
-    const ABOUT: &'static str = "heights of a surface on a grid, from HDF5 (runout-surface, version 1)";
-
-    fn check(self, context: &Context) -> std::result::Result<Self::Stage, Fault> {
-        if self.path.as_os_str().is_empty() {
-            return Err(Fault::at("path", "expected the name of a file"));
-        }
-        Ok(Box::new(HeightMapFile { path: context.path(&self.path), follow_links: self.follow_links }))
-    }
-}
-
-struct HeightMapFile {
-    path: PathBuf,
-    follow_links: bool,
-}
-
-impl Loader for HeightMapFile {
-    fn kind(&self) -> SourceKind {
-        SourceKind::Points
-    }
-
-    fn open(&self, wanted: &Request) -> Result<Source> {
-        let needed = wanted.columns.iter().filter(|column| !column.optional);
-        if let Some(other) = needed.into_iter().find(|column| !HeightGrid::COLUMNS[..3].contains(&column.name)) {
-            let problem = format!("a height map has no column `{}` ({})", other.name, other.about);
-            let help = "its points have x_mm, y_mm and height_nm; the separator `fly-cutting` takes these";
-            return Err(Error::new("read", self.path.display().to_string(), problem).help(help));
-        }
-        let (grid, links) = read(&self.path, self.follow_links)?;
-        let inputs = links.inputs();
-        let besides = inputs.iter().skip(1).map(|file| file.path().to_owned()).collect();
-        let mut points = Points { besides, opened: inputs, ..Points::of_grid(grid, self.path.clone()) };
-        points.remarks.extend(superblock::remark(links.input())?);
-        Ok(Source::Points(points))
-    }
+/// The nodes of a height map with a height, with the files behind them.
+///
+/// # Errors
+/// As [`read_height_map`] has them.
+pub fn height_map_points(path: &Path, follow_links: bool) -> Result<Points> {
+    let (grid, links) = read(path, follow_links)?;
+    let inputs = links.inputs();
+    let besides = inputs.iter().skip(1).map(|file| file.path().to_owned()).collect();
+    let mut points = Points { besides, opened: inputs, ..Points::of_grid(grid, path.to_owned()) };
+    points.remarks.extend(superblock::remark(links.input())?);
+    Ok(points)
 }
 
 /// Reads a height map.

@@ -33,7 +33,7 @@ mod type_name;
 mod utf8_path;
 
 pub use foreign::{AttributeValue, Attributes, ForeignDataset, ForeignFile};
-pub use height_map::{HeightMapConfig, read_height_map, write_height_map};
+pub use height_map::{height_map_points, read_height_map, write_height_map};
 pub use inspect::{CaptureReport, FileReport, StationReport, TableReport, inspect};
 pub use measurement::{
     loader::Hdf5Config,
@@ -52,9 +52,8 @@ pub const SURFACE_FORMAT: &str = "runout-surface";
 /// `version` of all of them.
 pub const VERSION: u64 = 1;
 
-/// Adds the loader and the exporter, both named `hdf5`, and the loader `height-map`.
+/// Adds the loader and the exporter, both named `hdf5`.
 pub fn register(registry: &mut Registry) {
     registry.loaders.add(Plugin::of::<Hdf5Config>());
-    registry.loaders.add(Plugin::of::<HeightMapConfig>());
     registry.exporters.add(Plugin::of::<ResultConfig>());
 }

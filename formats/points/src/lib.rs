@@ -1,13 +1,16 @@
-//! The loader `points`: measured points from CSV or Parquet, for the separators of any domain.
+//! The loader `points`: measured points from text, XLSX or Parquet, for the separators of any domain.
 //!
 //! A row is a point. The separator says which columns it takes ([`PointColumn`]); other columns are not read. `columns` gives the
 //! file's names where they differ, `where` selects rows.
 //!
 //! [`PointColumn`]: runout_core::points::PointColumn
 
+mod axis;
 mod parquet;
 mod select;
+mod sheet;
 mod text;
+mod unit;
 mod write;
 
 use std::{
@@ -26,6 +29,7 @@ use runout_core::{
 use schemars::JsonSchema;
 use serde::Deserialize;
 
+pub use axis::Axis;
 pub use write::write;
 
 /// Adds the loader `points`, also under the names that it had for single domains.
@@ -40,10 +44,21 @@ pub fn register(registry: &mut Registry) {
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PointsConfig {
-    /// CSV or Parquet file with one row a point, relative to the TOML. The separator says which columns it takes; `check` lists
-    /// them. CSV is separated by comma, semicolon or tab; the last two allow a decimal comma.
+    /// CSV, XLSX or Parquet file with one row a point, relative to the TOML. The separator says which columns it takes; `check` lists
+    /// them. Text is separated by comma, semicolon, tab or blanks; all but the first allow a decimal comma.
     pub path: PathBuf,
-    /// The file's names of columns that differ from the separator's: `columns = { "ΔX" = "dx_mm" }`.
+    /// Names of the columns of a text without a header, in their order: `names = ["x_mm", "y_mm", "z_mm"]`.
+    #[serde(default)]
+    pub names: Option<Vec<String>>,
+    /// Sheet of an XLSX file; without it the first one.
+    #[serde(default)]
+    pub sheet: Option<String>,
+    /// Direction near which the axis of the part lies, of coordinates `x_mm`, `y_mm`, `z_mm` for a separator that takes places about an axis
+    /// (`angle_deg`, `radius_mm`, `z_mm`). The axis is found from the points; without the key its direction too.
+    #[serde(default)]
+    pub axis: Option<Axis>,
+    /// The file's names of columns that differ from the separator's: `columns = { "ΔX" = "dx_mm" }`. Names that differ by the unit alone
+    /// (`dx_um`, `dx [µm]` for `dx_mm`) are found and converted.
     #[serde(default)]
     pub columns: BTreeMap<String, String>,
     /// Only rows with these values are read: `where = { a_deg = 0 }`.
@@ -65,11 +80,14 @@ impl StageConfig for PointsConfig {
     type Stage = Box<dyn Loader>;
 
     const NAME: &'static str = "points";
-    const ABOUT: &'static str = "measured points from CSV or Parquet, for any separator of points";
+    const ABOUT: &'static str = "measured points from text, XLSX or Parquet, for any separator of points";
 
     fn check(self, context: &Context) -> std::result::Result<Self::Stage, Fault> {
         if self.path.as_os_str().is_empty() {
             return Err(Fault::at("path", "expected the name of a file"));
+        }
+        if matches!(&self.names, Some(names) if names.is_empty() || names.iter().any(String::is_empty)) {
+            return Err(Fault::at("names", "expected a name for each column"));
         }
         let mut names: Vec<&String> = self.columns.values().collect();
         names.sort_unstable();
@@ -85,9 +103,16 @@ impl StageConfig for PointsConfig {
 /// # Errors
 /// When it cannot be read, lacks a column, or a row is not what its columns say.
 pub fn read(path: &Path, columns: &[PointColumn]) -> Result<Points> {
-    let config = PointsConfig { path: path.to_path_buf(), columns: BTreeMap::new(), selected: BTreeMap::new() };
+    let config = PointsConfig {
+        path: path.to_path_buf(),
+        names: None,
+        sheet: None,
+        axis: None,
+        columns: BTreeMap::new(),
+        selected: BTreeMap::new(),
+    };
     let input = InputFile::new(path)?;
-    select::points(RawTable::read(&input)?, &input, &config, columns)
+    select::points(RawTable::read(&input, &config)?, &input, &config, columns)
 }
 
 struct PointFile {
@@ -102,7 +127,7 @@ impl Loader for PointFile {
 
     fn open(&self, wanted: &Request) -> Result<Source> {
         let input = InputFile::new(&self.path)?;
-        let table = RawTable::read(&input)?;
+        let table = RawTable::read(&input, &self.config)?;
         select::points(table, &input, &self.config, wanted.columns).map(Source::Points)
     }
 }
@@ -130,10 +155,14 @@ enum RawColumn {
 }
 
 impl RawTable {
-    fn read(input: &InputFile) -> Result<Self> {
+    fn read(input: &InputFile, config: &PointsConfig) -> Result<Self> {
         let mut start = [0; 4];
         let read = std::io::Read::read(&mut input.open()?, &mut start);
         let length = read.map_err(|error| Error::caused("read", input.path().display().to_string(), error))?;
-        if start[..length] == *b"PAR1" { parquet::read(input) } else { text::read(input) }
+        match &start[..length] {
+            b"PAR1" => parquet::read(input),
+            b"PK\x03\x04" => sheet::read(input, config.sheet.as_deref()),
+            _ => text::read(input, config.names.as_deref()),
+        }
     }
 }

@@ -9,7 +9,7 @@ use runout_core::{
     points::{Column, Labels, PointColumn, PointKind, Points, Trace},
 };
 
-use crate::{Cell, PointsConfig, RawColumn, RawTable};
+use crate::{Cell, PointsConfig, RawColumn, RawTable, axis, unit};
 
 /// What marks a number may have.
 const MARKS: &str = "numbers have a decimal point, or a decimal comma where columns are separated by semicolon or tab, and no marks \
@@ -20,6 +20,9 @@ const SAME: f64 = 1e-6;
 /// Two names as near as this (Jaro-Winkler) are one with a slip of the pen.
 const ALIKE: f64 = 0.93;
 
+/// Columns that coordinates give about an axis.
+const ABOUT: [&str; 3] = ["angle_deg", "radius_mm", "z_mm"];
+
 pub(crate) fn points(
     table: RawTable,
     input: &InputFile,
@@ -29,22 +32,30 @@ pub(crate) fn points(
     let path = input.path();
     let table = renamed(table, path, config)?;
     let file = Raw { file: path.display().to_string(), table };
-    file.has_all(wanted)?;
+    let coordinates = file.coordinates(wanted);
+    if let (Some(_), None) = (config.axis, coordinates) {
+        let problem = "`axis` turns x_mm, y_mm and z_mm into places about an axis; the file lacks one of them, or the separator takes none";
+        return Err(Error::new("read", file.file, problem));
+    }
+    file.has_all(wanted, coordinates.is_some())?;
     let rows = file.selected(config)?;
     if rows.is_empty() {
         let problem = if file.table.rows == 0 { "it holds no points" } else { "no point has the values of `where`" };
         return Err(Error::new("read", file.file, problem));
     }
     let mut points = Points { input: path.to_path_buf(), opened: vec![input.clone()], ..Points::default() };
+    if let Some(places) = coordinates {
+        file.about_axis(places, &rows, config, wanted, &mut points)?;
+    }
     let mut traces = [None, None];
-    for column in wanted {
-        let Some(place) = file.place(column.name) else { continue };
+    for column in wanted.iter().filter(|column| coordinates.is_none() || !ABOUT.contains(&column.name)) {
+        let Some((place, factor)) = file.found(column.name)? else { continue };
         if column.optional && rows.iter().all(|row| file.is_empty(place, *row)) {
             continue;
         }
         match column.kind {
             PointKind::Number => {
-                let values = rows.iter().map(|row| file.number(place, *row)).collect::<Result<_>>()?;
+                let values = rows.iter().map(|row| Ok(factor * file.number(place, *row)?)).collect::<Result<_>>()?;
                 points.columns.push(Column { name: column.name.into(), values });
             }
             PointKind::Flag => {
@@ -94,8 +105,62 @@ impl Raw {
         self.table.names.iter().position(|known| known == name)
     }
 
+    /// The column of a name, or the one whose name differs by the unit alone, with the factor to the unit of the name.
+    fn found(&self, name: &str) -> Result<Option<(usize, f64)>> {
+        if let Some(place) = self.place(name) {
+            return Ok(Some((place, 1.0)));
+        }
+        let names = self.table.names.iter().enumerate();
+        let mut found = names.filter_map(|(place, known)| Some((place, unit::factor(known, name)?)));
+        match (found.next(), found.next()) {
+            (Some((one, _)), Some((other, _))) => {
+                let problem =
+                    format!("both `{}` and `{}` could be `{name}`", self.table.names[one], self.table.names[other]);
+                Err(Error::new("read", &self.file, problem).help("`columns` in [load] says which one it is"))
+            }
+            (found, _) => Ok(found),
+        }
+    }
+
+    /// Places of x, y and z where the separator takes places about an axis and the file has coordinates in their place.
+    fn coordinates(&self, wanted: &[PointColumn]) -> Option<[usize; 3]> {
+        let takes = ABOUT[..2].iter().all(|name| wanted.iter().any(|column| column.name == *name));
+        let place = |name: &str| self.found(name).ok().flatten().map(|(place, _)| place);
+        let lacks = place(ABOUT[0]).is_none() && place(ABOUT[1]).is_none();
+        (takes && lacks).then_some(())?;
+        Some([place("x_mm")?, place("y_mm")?, place("z_mm")?])
+    }
+
+    /// Adds the columns about the axis that is found from coordinates.
+    fn about_axis(
+        &self,
+        places: [usize; 3],
+        rows: &[usize],
+        config: &PointsConfig,
+        wanted: &[PointColumn],
+        points: &mut Points,
+    ) -> Result<()> {
+        let factors =
+            ["x_mm", "y_mm", "z_mm"].map(|name| self.found(name).ok().flatten().map_or(1.0, |(_, factor)| factor));
+        let mut coordinates = Vec::with_capacity(rows.len());
+        for row in rows {
+            let mut point = [0.0; 3];
+            for ((number, place), factor) in point.iter_mut().zip(places).zip(factors) {
+                *number = factor * self.number(place, *row)?;
+            }
+            coordinates.push(point);
+        }
+        let about = axis::about(&coordinates, config.axis)
+            .map_err(|problem| Error::new("find the axis of", &self.file, problem).of(ErrorKind::UnsuitableData))?;
+        points.remarks.push(about.remark);
+        points
+            .columns
+            .extend(about.columns.into_iter().filter(|one| wanted.iter().any(|column| column.name == one.name)));
+        Ok(())
+    }
+
     /// Refuses a file that lacks a column, has one twice, or has one whose name is nearly that of an optional one.
-    fn has_all(&self, wanted: &[PointColumn]) -> Result<()> {
+    fn has_all(&self, wanted: &[PointColumn], has_coordinates: bool) -> Result<()> {
         let names = &self.table.names;
         let refuse = |problem: String| {
             let (optional, needed): (Vec<_>, Vec<_>) = wanted.iter().partition(|column| column.optional);
@@ -106,8 +171,9 @@ impl Raw {
             let help = format!("the columns are {}{besides}; `columns` in [load] gives the file's names", list(needed));
             Error::new("read", format!("{}, line 1", self.file), problem).help(help)
         };
-        for column in wanted {
+        for column in wanted.iter().filter(|column| !has_coordinates || !ABOUT.contains(&column.name)) {
             match names.iter().filter(|name| *name == column.name).count() {
+                0 if self.found(column.name)?.is_some() => {}
                 0 if !column.optional => {
                     let unit = if column.unit.is_empty() { String::new() } else { format!(", in {}", column.unit) };
                     let problem = format!("the column `{}` is missing ({}{unit})", column.name, column.about);

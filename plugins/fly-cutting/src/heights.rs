@@ -2,12 +2,9 @@
 
 use std::ops::Range;
 
-use runout_core::{Error, Result, numerics::height_map::HeightMap, points::Points};
+use runout_core::{Error, Result, height_grid::GridPlaces, points::Points};
 
 use crate::config::FlyCuttingConfig;
-
-/// Places that differ by less than this share of a step are the same.
-const SAME: f64 = 0.01;
 
 /// A row of the map.
 #[derive(Debug, Clone, PartialEq)]
@@ -31,43 +28,9 @@ pub(crate) struct Heights {
     pub std_nm: Option<f64>,
 }
 
-/// The grid that points lie on.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Grid {
-    pub rows: usize,
-    pub columns: usize,
-    pub step_x_mm: f64,
-    pub step_y_mm: f64,
-    pub origin_mm: [f64; 2],
-    /// Node of each point, row · columns + column.
-    pub node: Vec<u32>,
-}
-
-impl Grid {
-    /// Values of points as a map in µm, NaN where there is no point.
-    pub(crate) fn map_um(&self, values_nm: impl Iterator<Item = f64>) -> Result<HeightMap<'static>> {
-        let all = self.laid(values_nm.map(|value| 1e-3 * value));
-        HeightMap::new(all, self.columns, self.step_x_mm, self.step_y_mm, false)
-    }
-
-    /// Values of points at their nodes, row by row, NaN where there is no point.
-    pub(crate) fn laid(&self, values: impl Iterator<Item = f64>) -> Vec<f64> {
-        let mut all = vec![f64::NAN; self.rows * self.columns];
-        for (node, value) in self.node.iter().zip(values) {
-            all[*node as usize] = value;
-        }
-        all
-    }
-
-    /// Nodes without a point.
-    pub(crate) fn holes(&self) -> usize {
-        self.rows * self.columns - self.node.len()
-    }
-}
-
 impl Heights {
     /// Reads the columns of points.
-    pub(crate) fn new(points: &Points, config: &FlyCuttingConfig) -> Result<(Self, Grid)> {
+    pub(crate) fn new(points: &Points, config: &FlyCuttingConfig) -> Result<(Self, GridPlaces)> {
         let object = || points.input.display().to_string();
         let failure = |problem: String| Error::new("read the surface from", object(), problem);
         let [x, y, z] = [points.column("x_mm")?, points.column("y_mm")?, points.column("height_nm")?];
@@ -90,7 +53,7 @@ impl Heights {
         }
         let sorted = |values: &[f64]| -> Vec<f64> { order.iter().map(|index| values[*index as usize]).collect() };
         let [x, y, z] = [sorted(x), sorted(y), sorted(z)];
-        let grid = grid(&x, &y).map_err(failure)?;
+        let grid = GridPlaces::of(&x, &y).map_err(failure)?;
         let radius_mm = config.cutter_radius_mm;
         if let Some(y_mm) = y.first().into_iter().chain(y.last()).find(|y| y.abs() >= radius_mm) {
             let problem =
@@ -179,45 +142,4 @@ impl Row {
         let cosine = (1.0 - sine * sine).sqrt();
         Self { y_mm, angle: sine.asin(), cosine, sag_mm: -y_mm * sine / (1.0 + cosine), points }
     }
-}
-
-/// The grid of points that are ordered by y and then by x.
-fn grid(x: &[f64], y: &[f64]) -> std::result::Result<Grid, String> {
-    let lines = |values: &mut Vec<f64>, name: &str| -> std::result::Result<(usize, f64, f64), String> {
-        values.sort_unstable_by(f64::total_cmp);
-        let span = values.last().zip(values.first()).map_or(0.0, |(last, first)| last - first);
-        values.dedup_by(|next, kept| *next - *kept <= 1e-9 * span);
-        let [first, .., last] = values[..] else {
-            return Err(format!("all its points have the same {name}: two or more are needed"));
-        };
-        let step = values.windows(2).map(|pair| pair[1] - pair[0]).fold(f64::INFINITY, f64::min);
-        let count = ((last - first) / step).round();
-        let uneven = values.iter().find(|value| {
-            let place = (*value - first) / step;
-            (place - place.round()).abs() > SAME
-        });
-        match uneven {
-            Some(value) => Err(format!("{name} = {value} mm is not on a grid of steps of {step} mm from {first} mm")),
-            None if count > 1e6 => Err(format!("its points are no grid: steps of {step} mm from {first} to {last} mm")),
-            None => Ok((count as usize + 1, step, first)),
-        }
-    };
-    let mut ys = y.to_vec();
-    ys.dedup();
-    let (rows, step_y_mm, first_y) = lines(&mut ys, "y")?;
-    let (columns, step_x_mm, first_x) = lines(&mut x.to_vec(), "x")?;
-    let nodes = rows.checked_mul(columns).filter(|nodes| u32::try_from(*nodes).is_ok());
-    if nodes.is_none_or(|nodes| nodes > 4 * x.len() + 1000) {
-        return Err(format!("its {} points fill less than a quarter of {rows} rows and {columns} columns", x.len()));
-    }
-    let place = |value: f64, first: f64, step: f64| ((value - first) / step).round() as u32;
-    let node: Vec<u32> = x
-        .iter()
-        .zip(y)
-        .map(|(x, y)| place(*y, first_y, step_y_mm) * columns as u32 + place(*x, first_x, step_x_mm))
-        .collect();
-    if let Some(pair) = node.windows(2).position(|pair| pair[1] <= pair[0]) {
-        return Err(format!("two points are at x = {} mm, y = {} mm", x[pair], y[pair]));
-    }
-    Ok(Grid { rows, columns, step_x_mm, step_y_mm, origin_mm: [first_x, first_y], node })
 }

@@ -2,7 +2,7 @@
 
 use runout_core::{
     Result,
-    height_grid::HeightGrid,
+    height_grid::GridPlaces,
     numerics::height_map::HeightMap,
     stage::{Evaluable, Outcome, PlaneMap},
     standards::areal,
@@ -10,11 +10,7 @@ use runout_core::{
     table::{ColumnSpec, Figure, TableRows, TableSpec, numbers},
 };
 
-use crate::{
-    config::FlyCuttingConfig,
-    heights::{Grid, Heights},
-    passes::Line,
-};
+use crate::{config::FlyCuttingConfig, heights::Heights, passes::Line};
 
 /// Signs and references.
 const CONVENTION: &str = "heights in nm, out of the material positive; x along the feed, y = 0 below the spindle's axis; the tool \
@@ -53,7 +49,7 @@ pub(crate) fn tables() -> Vec<TableSpec> {
 pub(crate) struct Known<'a> {
     pub config: &'a FlyCuttingConfig,
     pub heights: &'a Heights,
-    pub grid: &'a Grid,
+    pub grid: &'a GridPlaces,
     /// Ideal surface with level, in nm.
     pub ideal_nm: &'a [f64],
     pub before_nm: &'a [f64],
@@ -97,15 +93,13 @@ impl Known<'_> {
 
     /// Heights on the whole grid.
     fn plane(&self, of: &str, heights_nm: impl Iterator<Item = f64>) -> Evaluable {
-        let Grid { columns, step_x_mm, step_y_mm, origin_mm: [origin_x_mm, origin_y_mm], .. } = *self.grid;
-        let (height_nm, std_nm) = (self.grid.laid(heights_nm), self.heights.std_nm);
-        let grid = HeightGrid { columns, step_x_mm, step_y_mm, origin_x_mm, origin_y_mm, std_nm, height_nm };
-        Evaluable::HeightMap(PlaneMap { of: of.into(), grid })
+        let grid = self.grid.heights(heights_nm, self.heights.std_nm);
+        Evaluable::HeightMap(PlaneMap::new(of, grid))
     }
 
     /// Height parameters after removal of the least-squares plane.
     fn areal(&self, of: &str, heights_nm: impl Iterator<Item = f64>) -> Result<Vec<NamedValue>> {
-        let map: HeightMap = areal::without_polynomial(&self.grid.map_um(heights_nm)?, 1)?;
+        let map: HeightMap = areal::without_polynomial(&self.grid.heights(heights_nm, None).height_map()?, 1)?;
         let found = areal::heights(&map);
         let about = |what: &str| format!("{what} after removal of the least-squares plane (ISO 25178-2, 4.2)");
         let named = |symbol: &str, number: f64, unit: &str, what: &str| {

@@ -3,6 +3,7 @@
 use runout_core::{
     Result,
     fault::Fault,
+    height_grid::GridPlaces,
     model::{Fit, Model, Setting},
     numerics::least_squares::dot,
     pipeline::{Context, StageConfig},
@@ -14,7 +15,7 @@ use runout_core::{
 use crate::{
     config::FlyCuttingConfig,
     effects::applied,
-    heights::{Grid, Heights},
+    heights::Heights,
     model::{CutFit, CutModel},
     outcome::{Known, tables},
     passes::{Applied, Cut},
@@ -61,7 +62,7 @@ const COLUMNS: [PointColumn; 4] = [
 /// A map with its grid.
 pub(crate) struct Measured {
     pub heights: Heights,
-    pub grid: Grid,
+    pub grid: GridPlaces,
     pub remarks: Vec<String>,
 }
 

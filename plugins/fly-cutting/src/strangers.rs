@@ -1,8 +1,8 @@
 //! What is left in single places: scratches, pits, dust. No effect of the library is local.
 
-use runout_core::numerics::least_squares::dot;
+use runout_core::{height_grid::GridPlaces, numerics::least_squares::dot};
 
-use crate::heights::{Grid, Heights};
+use crate::heights::Heights;
 
 /// Chance of noise being taken for a stranger anywhere on the map, about.
 const CHANCE: f64 = 1e-3;
@@ -34,7 +34,7 @@ pub(crate) struct Strangers {
 }
 
 /// Looks for them in what is left of all points, in nm.
-pub(crate) fn find(heights: &Heights, grid: &Grid, residual_nm: &[f64]) -> Strangers {
+pub(crate) fn find(heights: &Heights, grid: &GridPlaces, residual_nm: &[f64]) -> Strangers {
     let noise_nm = heights.std_nm.unwrap_or(0.0).max(spread(residual_nm.to_vec()));
     let count = residual_nm.len() as f64;
     if noise_nm <= 0.0 {
@@ -74,7 +74,7 @@ fn spread(mut values: Vec<f64>) -> f64 {
 }
 
 struct Map<'a> {
-    grid: &'a Grid,
+    grid: &'a GridPlaces,
     /// In standard deviations; NaN where there is no point.
     left: Vec<f64>,
     flagged: Vec<bool>,

@@ -183,6 +183,11 @@ impl Evaluate {
         self.faces = once_each(std::mem::take(&mut self.faces));
     }
 
+    /// Adds areal values, which are asked for by name otherwise.
+    pub(crate) fn add_areal(&mut self) {
+        self.groups.push(Group::Areal);
+    }
+
     /// Leaves only what is computed from these.
     pub fn keep_given(&mut self, given: &[EvaluableKind]) {
         self.groups.retain(|group| group.is_given_by(given));

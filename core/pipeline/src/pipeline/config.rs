@@ -21,7 +21,7 @@ use super::{
     registry::{Context, Registry},
 };
 use crate::{
-    stage::{Check, Exporter, Loader, Request, SourceKind},
+    stage::{Check, Exporter, Loader, PointSeparator, Request, SourceKind},
     summary::Limit,
 };
 use diagnose::{Diagnose, DiagnoseConfig};
@@ -308,7 +308,9 @@ fn evaluate(root: &Table, route: &Route, rig: Option<&Rig>) -> Result<Evaluate, 
         return Err(fault.help("leave it out; the values are those of the separator"));
     }
     let measures = rig.filter(|_| matches!(route, Route::Turns { .. }));
+    let mut lists_values = false;
     let check = |config: EvaluateConfig| {
+        lists_values = config.values.is_some();
         // Sections of measured points are those of their files.
         measures.map_or(Ok(()), |rig| config.check_datum(rig))?;
         config.check_given(&given)?;
@@ -316,6 +318,9 @@ fn evaluate(root: &Table, route: &Route, rig: Option<&Rig>) -> Result<Evaluate, 
     };
     let configured = configured.map(|table| checked::<EvaluateConfig, _>(&table, check)).transpose()?;
     let mut evaluate = configured.unwrap_or_default();
+    if !lists_values && route.point_separator().is_some_and(PointSeparator::is_for_areal_values) {
+        evaluate.add_areal();
+    }
     evaluate.keep_given(&given);
     if let Some(rig) = measures {
         evaluate.add_faces(rig);

@@ -57,6 +57,11 @@ pub trait PointSeparator: Send + Sync {
         false
     }
 
+    /// Whether areal values are computed where `[evaluate]` lists no values: a height map as it was measured has no others.
+    fn is_for_areal_values(&self) -> bool {
+        false
+    }
+
     /// Whether [`remarks`](Self::remarks) needs the surface.
     fn needs_surface(&self) -> bool {
         false

@@ -1,0 +1,142 @@
+//! A circle or a cylinder as measured: traces for the least-squares cylinder.
+
+use runout_core::{
+    Error, ErrorKind, Result,
+    points::{Column, Points, Trace},
+};
+use runout_cylinder::{LeastSquaresCylinder, LeastSquaresCylinderConfig};
+
+use crate::config::{AsMeasuredConfig, ORDERS, Object};
+
+/// Sections that are told apart by a gap in their heights, at most.
+const MOST_SECTIONS: f64 = 200.0;
+/// Share of the radius that the heights of one circle may differ by.
+const LEVEL: f64 = 1e-3;
+/// Share of steps against the direction of a helix.
+const BACKWARD: f64 = 0.05;
+const UM_PER_MM: f64 = 1e3;
+
+/// The points as traces of a cylinder, and the separator for them.
+pub(crate) fn circles(points: &Points, config: &AsMeasuredConfig) -> Result<(Points, LeastSquaresCylinder)> {
+    let object = points.input.display().to_string();
+    let refuse = |problem: String| Error::new("read the circles of", &object, problem);
+    let column =
+        |name: &str| points.columns.iter().find(|column| column.name == name).map(|column| column.values.clone());
+    let angle_deg = points.column("angle_deg")?.to_vec();
+    let (radius_mm, deviation_um) = match (column("radius_mm"), column("deviation_um"), config.radius_mm) {
+        (Some(radius), None, nominal) => {
+            let nominal = nominal.unwrap_or_else(|| radius.iter().sum::<f64>() / radius.len() as f64);
+            (nominal, radius.iter().map(|radius| UM_PER_MM * (radius - nominal)).collect())
+        }
+        (None, Some(deviation), Some(nominal)) => (nominal, deviation),
+        (None, Some(_), None) => {
+            return Err(refuse("deviations do not say which radius they count from".into())
+                .help("`radius_mm` in [separate] does"));
+        }
+        (Some(_), Some(_), _) => {
+            return Err(refuse("it has both `radius_mm` and `deviation_um`: which one counts?".into()));
+        }
+        (None, None, _) => {
+            let problem = "it has neither `radius_mm` (distance from the axis) nor `deviation_um`";
+            return Err(refuse(problem.into())
+                .help("coordinates x_mm, y_mm and z_mm become both with `axis = \"z\"` in [load]"));
+        }
+    };
+    if !(radius_mm.is_finite() && radius_mm > 0.0) {
+        return Err(refuse(format!("the mean radius is {radius_mm} mm")));
+    }
+    let z_mm = column("z_mm").unwrap_or_else(|| vec![0.0; angle_deg.len()]);
+    let (order, traces) = if points.traces.len() > 1 {
+        let kind =
+            |trace: &Trace| if trace.kind == "generatrix" { "generatrix".to_owned() } else { "circle".to_owned() };
+        let traces = points.traces.iter().map(|trace| Trace { kind: kind(trace), ..trace.clone() });
+        ((0..angle_deg.len()).collect(), traces.collect())
+    } else {
+        sections(&z_mm, radius_mm).map_err(|problem| refuse(problem).of(ErrorKind::UnsuitableData))?
+    };
+    if config.object == Object::Roundness && traces.len() > 1 {
+        return Err(refuse(format!("it has {} circles", traces.len())).help("`object = \"cylinder\"` takes several"));
+    }
+    let sorted = |values: &[f64]| order.iter().map(|index| values[*index]).collect::<Vec<f64>>();
+    let columns = [("angle_deg", sorted(&angle_deg)), ("z_mm", sorted(&z_mm)), ("deviation_um", sorted(&deviation_um))];
+    let columns = columns.into_iter().map(|(name, values)| Column { name: name.into(), values });
+    let placed = Points { columns: columns.collect(), traces, labels: Vec::new(), ..points.clone() };
+    let separator = LeastSquaresCylinderConfig {
+        radius_mm,
+        used: None,
+        hold_out: Vec::new(),
+        max_order: config.max_order.unwrap_or(ORDERS),
+        outlier_mad: config.outlier_mad,
+        outlier_order: config.max_order.unwrap_or(50),
+        max_lobes: 2,
+    };
+    let separator = separator.separator().map_err(|fault| refuse(fault.to_string()).of(ErrorKind::Configuration))?;
+    Ok((placed, separator))
+}
+
+/// The order of the points by section, and a trace a section: circles at their heights, or all points as one circle or helix.
+fn sections(z_mm: &[f64], radius_mm: f64) -> std::result::Result<(Vec<usize>, Vec<Trace>), String> {
+    let mut order: Vec<usize> = (0..z_mm.len()).collect();
+    let whole = |id: &str| Trace { id: id.into(), kind: "circle".into(), points: 0..z_mm.len() };
+    let [low, high] =
+        z_mm.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], z| [low.min(*z), high.max(*z)]);
+    let range = high - low;
+    if range.is_nan() || range <= LEVEL * radius_mm {
+        return Ok((order, vec![whole("circle")]));
+    }
+    order.sort_by(|one, other| z_mm[*one].total_cmp(&z_mm[*other]));
+    let apart_mm = (range / MOST_SECTIONS).max(0.1 * LEVEL * radius_mm);
+    let breaks: Vec<usize> =
+        (1..order.len()).filter(|place| z_mm[order[*place]] - z_mm[order[place - 1]] > apart_mm).collect();
+    if breaks.is_empty() {
+        let steps = z_mm.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| step.abs() > 0.0);
+        let [up, down] =
+            steps.fold([0.0, 0.0], |[up, down], step| if step > 0.0 { [up + 1.0, down] } else { [up, down + 1.0] });
+        if f64::min(up, down) > BACKWARD * (up + down) {
+            return Err(format!(
+                "its {} heights are neither those of circles nor of a helix: the points are scattered over the wall",
+                z_mm.len()
+            ));
+        }
+        return Ok(((0..z_mm.len()).collect(), vec![whole("helix")]));
+    }
+    let ends: Vec<usize> = std::iter::once(0).chain(breaks).chain(std::iter::once(order.len())).collect();
+    let mut traces = Vec::new();
+    for pair in ends.windows(2) {
+        let part = &mut order[pair[0]..pair[1]];
+        let span = z_mm[part[part.len() - 1]] - z_mm[part[0]];
+        if span > LEVEL.max(range / radius_mm / MOST_SECTIONS) * radius_mm {
+            let (low, high) = (z_mm[part[0]], z_mm[part[part.len() - 1]]);
+            return Err(format!(
+                "heights from {low:.4} to {high:.4} mm are no circle: a column `trace` names the circles"
+            ));
+        }
+        let mean = part.iter().map(|index| z_mm[*index]).sum::<f64>() / part.len() as f64;
+        // In the order in which they were measured.
+        part.sort_unstable();
+        traces.push(Trace { id: format!("z={mean:.3}"), kind: "circle".into(), points: pair[0]..pair[1] });
+    }
+    Ok((order, traces))
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "tests")]
+
+    use super::*;
+
+    #[test]
+    fn heights_are_sections_or_a_helix() {
+        let three: Vec<f64> = (0..30).map(|index| [5.0, 1.0, 9.0][index % 3] + 1e-4 * (index % 2) as f64).collect();
+        let (order, traces) = sections(&three, 20.0).unwrap();
+        let named: Vec<(&str, std::ops::Range<usize>)> =
+            traces.iter().map(|trace| (trace.id.as_str(), trace.points.clone())).collect();
+        assert_eq!(named, [("z=1.000", 0..10), ("z=5.000", 10..20), ("z=9.000", 20..30)]);
+        assert_eq!(order[..3], [1, 4, 7]);
+        let helix: Vec<f64> = (0..500).map(|index| 0.01 * f64::from(index)).collect();
+        assert_eq!(sections(&helix, 20.0).unwrap().1[0].id, "helix");
+        let scattered: Vec<f64> = (0..500).map(|index| f64::from(index * 7919 % 500) * 0.01).collect();
+        assert!(sections(&scattered, 20.0).unwrap_err().contains("scattered"));
+        assert_eq!(sections(&[1.0; 9], 20.0).unwrap().1[0].id, "circle");
+    }
+}

@@ -1,0 +1,100 @@
+//! Points as programs write them: without a header, with blanks, in a sheet, in other units, as coordinates of a measuring machine.
+#![allow(clippy::unwrap_used, reason = "tests")]
+
+use std::{f64::consts::TAU, fmt::Write, fs, path::Path};
+
+use runout_core::{
+    pipeline::{Pipeline, Registry},
+    summary::Summary,
+};
+
+fn run(load: &str, separate: &str) -> Result<Summary, String> {
+    let mut registry = Registry::default();
+    runout_points::register(&mut registry);
+    runout_as_measured::register(&mut registry);
+    let text = format!(
+        "load = {{ plugin = 'points', {load} }}\nseparate = {{ plugin = 'as-measured', {separate} }}\nevaluate = {{ filter_upr = [] }}"
+    );
+    let pipeline =
+        Pipeline::from_toml(&text, env!("CARGO_MANIFEST_DIR"), &registry).map_err(|error| error.to_string())?;
+    pipeline.run().map_err(|error| error.to_string())
+}
+
+fn rons(summary: &Summary) -> Vec<(Option<String>, f64)> {
+    let placed = summary.placed_values();
+    let ront = placed.iter().filter(|placed| placed.value.symbol == "RONt" && placed.value.reference == "LSCI");
+    ront.map(|placed| (placed.section.map(str::to_owned), placed.value.value)).collect()
+}
+
+fn written(folder: &Path, name: &str, text: &str) -> String {
+    let path = folder.join(name);
+    fs::write(&path, text).unwrap();
+    format!("path = '{}'", path.display())
+}
+
+/// Two lobes of 2.5 µm: 5 µm peak to valley.
+fn near(found: &[(Option<String>, f64)], expected_um: f64) {
+    assert!(!found.is_empty());
+    for (section, ront) in found {
+        assert!((ront / expected_um - 1.0).abs() < 1e-3, "{section:?}: {ront}");
+    }
+}
+
+#[test]
+fn a_sheet_with_units_in_its_header() {
+    let of = |sheet: &str| {
+        run(&format!("path = 'tests/data/circle.xlsx', {sheet}"), "object = 'roundness', radius_mm = 8.0")
+    };
+    near(&rons(&of("sheet = 'Readings'").unwrap()), 5.0);
+    assert!(of("sheet = 'Reading'").unwrap_err().contains("no sheet `Reading`"));
+    assert!(of("").unwrap_err().contains("angle_deg"));
+}
+
+#[test]
+fn coordinates_of_a_measuring_machine() {
+    let folder = tempfile::tempdir().unwrap();
+    // A cylinder of radius 20 mm along y, leaning, with two lobes of 2.5 µm; three circles of 120 points.
+    let mut lines = String::new();
+    for height in [0.0, 12.0, 30.0] {
+        for index in 0..120 {
+            let angle = TAU * f64::from(index) / 120.0;
+            let radius = 20.0 + 2.5e-3 * (2.0 * angle).cos();
+            // Right-handed about y: z and x are the first and the second direction.
+            let [x, y, z] = [radius * angle.sin() + 5.0 + 1e-4 * height, height - 7.0, radius * angle.cos() - 3.0];
+            writeln!(lines, "{x:.7}   {y:.7} {z:.7}").unwrap();
+        }
+    }
+    let path = written(folder.path(), "cmm.txt", &lines);
+    let named = format!("{path}, names = ['x_mm', 'y_mm', 'z_mm']");
+    for axis in ["", ", axis = 'y'"] {
+        let summary = run(&format!("{named}{axis}"), "object = 'cylinder'").unwrap();
+        assert_eq!(summary.stations.len(), 3);
+        near(&rons(&summary), 5.0);
+        let found = summary.warnings.iter().chain(&summary.notes).find(|said| said.contains("the axis is near y"));
+        assert!(found.is_some_and(|said| said.contains("radius 20.0000")), "{:?}", summary.warnings);
+    }
+    let refused = run(&path, "object = 'cylinder'").unwrap_err();
+    assert!(refused.contains("no names of columns"), "{refused}");
+    let several = run(&named, "object = 'roundness'").unwrap_err();
+    assert!(several.contains("3 circles"), "{several}");
+}
+
+#[test]
+fn units_of_any_length_and_rounded_grids() {
+    let folder = tempfile::tempdir().unwrap();
+    // Steps of 24.691 µm, written with three decimals of a millimetre; heights in µm between blanks.
+    let mut lines = "x_mm y_mm height [µm]\n".to_owned();
+    for row in 0..20 {
+        for column in 0..30 {
+            let place = |number: i32| f64::from(number) * 0.024_691;
+            let height = if (row + column) % 2 == 0 { 1.0 } else { -1.0 };
+            writeln!(lines, "{:.3} {:.3} {height:.4}", place(column), place(row)).unwrap();
+        }
+    }
+    let path = written(folder.path(), "map.txt", &lines);
+    let summary = run(&path, "form = 'none'").unwrap();
+    let sq = summary.values.iter().find(|value| value.symbol == "Sq").unwrap().value.unwrap();
+    assert!((sq - 1.0).abs() < 1e-9, "{sq}");
+    let both = written(folder.path(), "both.csv", "x_mm,y_mm,height_um,height [mm]\n0,0,1,2\n");
+    assert!(run(&both, "form = 'none'").unwrap_err().contains("could be `height_nm`"));
+}
