@@ -184,7 +184,7 @@ impl Evaluate {
     }
 
     /// Adds areal values, which are asked for by name otherwise.
-    pub(crate) fn add_areal(&mut self) {
+    pub fn add_areal(&mut self) {
         self.groups.push(Group::Areal);
     }
 
