@@ -46,7 +46,8 @@ pub(crate) fn report(path: &Path) -> Result<Report> {
         }
         return Ok(channels(path)?.unwrap_or(Report::Parquet(report)));
     }
-    if let Some(text) = runout_csv::inspect(path)?
+    // What is no text is left to those who know it.
+    if let Ok(Some(text)) = runout_csv::inspect(path)
         && text.angle_by.is_some()
     {
         return Ok(Report::Text(text));
