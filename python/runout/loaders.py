@@ -68,6 +68,66 @@ class Csv:
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
+class Channels:
+    """Named channels of other programs: TDMS, MAT, HDF5, text, LVM, NumPy, Parquet, Arrow, UFF, WAV"""
+
+    plugin: ClassVar[str] = "channels"
+
+    angle: Union[Mapping[str, Any], None] = None
+    """The angle of the spindle, sample by sample; it may begin anew with each turn."""
+
+    channel_path: Union[str, None] = None
+    """Where channels lie in the file, with `{setup}`, `{station}` and `{channel}` in the place of their names:
+    `"runs/{setup}/{channel}/values"`."""
+
+    channels: Union[Mapping[str, Any], None] = None
+    """Of each sensor of the rig, its channel; without it the channel named like the sensor. Where a format has levels, groups
+    stand before the name: `"Group/Channel"`, `"struct.field"`; a column of a matrix is `"data[:, 3]"`, counted from 0."""
+
+    format: Union[str, None] = None
+    """The format, where the first bytes of the file do not say it: `tdms`, `mat`, `hdf5`, `text`, `npy`, `npz`, `parquet`,
+    `arrow`, `uff` or `wav`."""
+
+    marker: Union[Mapping[str, Any], None] = None
+    """The once-per-turn mark, as a trace of pulses or a channel of 0 and 1: a turn begins where it crosses the threshold."""
+
+    path: Union[str, None] = None
+    """The file, relative to the TOML."""
+
+    pattern: Union[str, None] = None
+    """Paths of several files, relative to the TOML, instead of `path`: `{setup}`, `{station}` and `{channel}` are in the place of
+    their names, as in `"{setup}_{station}.tdms"`."""
+
+    pulses_per_turn: Union[int, None] = None
+    """Pulses of an encoder in one turn: `marker` then has so many pulses a turn, or `angle` and `times` count them."""
+
+    sample_rate_hz: Union[float, None] = None
+    """Sampling rate in Hz, where the file has none."""
+
+    setups: Union[Mapping[str, Any], None] = None
+    """Of each setup of the rig, its group, variable or part of the file's name; without it the names as they are."""
+
+    speed_rpm: Union[float, None] = None
+    """Speed of the spindle as set, in rpm."""
+
+    stations: Union[Sequence[Mapping[str, Any]], None] = None
+    """The axial stations; one without a name where it is left out. Their names are parts of the files' names, or groups in the
+    groups of the setups."""
+
+    time: Union[str, None] = None
+    """The channel of the times of the samples, where it is not named like one."""
+
+    times: Union[str, None] = None
+    """The channel of the times of the marks, in s unless the file says otherwise, counted as those of the samples."""
+
+    unit: Union[str, None] = None
+    """Unit of the sensors' numbers, where the file has none: `um`, `mm`, `nm`, `mil`, `in`, `V` or `mV`."""
+
+    zero: Union[Mapping[str, Any], None] = None
+    """The once-per-turn mark beside the pulses of an encoder: where the angle is 0."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
 class Points:
     """Measured points from CSV or Parquet, for any separator of points"""
 

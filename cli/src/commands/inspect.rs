@@ -50,7 +50,8 @@ pub(crate) fn report(path: &Path) -> Result<Report> {
         let map = runout_maps::read(path, &runout_maps::Wanted::default())?;
         return Ok(Report::Map(MapReport::new(map)));
     }
-    if let Some(text) = runout_csv::inspect(path)?
+    // What is no text is left to those who know it.
+    if let Ok(Some(text)) = runout_csv::inspect(path)
         && text.angle_by.is_some()
     {
         return Ok(Report::Text(text));

@@ -42,6 +42,8 @@ pub const FORMATS: [Format; 10] = [
     text::FORMAT,
 ];
 
+/// The format without a signature.
+pub(crate) const TEXT: &str = text::FORMAT.name;
 /// First bytes that formats look at.
 const HEAD: u64 = 4096;
 

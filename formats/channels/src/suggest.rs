@@ -64,7 +64,12 @@ enum Turning {
 pub fn inspect(path: &Path) -> Result<Option<ChannelsReport>> {
     let input = InputFile::new(path)?;
     let Ok(format) = formats::format_of(&input, None) else { return Ok(None) };
-    let file: Arc<dyn ChannelFile> = formats::open(&input, Some(format.name))?.into();
+    let file: Arc<dyn ChannelFile> = match formats::open(&input, Some(format.name)) {
+        Ok(file) => file.into(),
+        // Nothing at its beginning says that a text is a table.
+        Err(_) if format.name == formats::TEXT => return Ok(None),
+        Err(error) => return Err(error),
+    };
     let mut channels = Vec::with_capacity(file.channels().len());
     let mut turning: Vec<Option<Turning>> = Vec::new();
     for (index, channel) in file.channels().iter().enumerate() {
@@ -91,7 +96,7 @@ fn beginning(file: &dyn ChannelFile, index: usize, wanted: usize) -> Result<Vec<
 /// Of all that look like marks, one that is named like one, or else the first.
 fn best_mark(channels: &[Channel], turning: &[Option<Turning>]) -> Option<(usize, Turning)> {
     let found = || turning.iter().enumerate().filter_map(|(index, turning)| Some((index, (*turning)?)));
-    found().find(|(index, _)| is_mark(&channels[*index].name)).or_else(|| found().next())
+    found().find(|(index, _)| is_mark(&channels[*index].path())).or_else(|| found().next())
 }
 
 /// Whether a name is one of marks and encoders.
@@ -144,12 +149,15 @@ fn rounded(value: f64) -> f64 {
 /// The table for the file.
 fn table(file: &str, channels: &[Channel], mark: Option<(&Channel, Turning)>) -> String {
     let mut text = format!("[load]\nplugin = \"channels\"\npath = {}\n", quoted(file));
-    let is_sensor = |channel: &&Channel| {
-        channel.kind.is_number()
-            && channel.samples > 1
-            && !is_time(channel)
-            && mark.is_none_or(|(mark, _)| mark.name != channel.name)
+    let is_signal = |channel: &Channel| channel.kind.is_number() && channel.samples > 1 && !is_time(channel);
+    // Where groups have one channel each, of one name, the groups are the channels.
+    let mut signals = channels.iter().filter(|channel| is_signal(channel));
+    let one_name = signals.next().filter(|first| signals.all(|channel| channel.name == first.name));
+    let by_group = one_name.is_some() && channels.iter().filter(|channel| is_signal(channel)).count() > 1;
+    let is_mark = |channel: &Channel| {
+        mark.is_some_and(|(mark, _)| mark.name == channel.name && (!by_group || mark.group == channel.group))
     };
+    let is_sensor = |channel: &&Channel| is_signal(channel) && !is_mark(channel);
     let sensors: Vec<&Channel> = channels.iter().filter(is_sensor).collect();
     // Channels that one group has are those of all: setups have the same.
     let mut groups: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
@@ -164,7 +172,8 @@ fn table(file: &str, channels: &[Channel], mark: Option<(&Channel, Turning)>) ->
     let first = order.first().copied().unwrap_or_default();
     let names = groups.get(first).cloned().unwrap_or_default();
     let alike: Vec<&str> = order.iter().copied().filter(|group| groups.get(group) == Some(&names)).collect();
-    if alike.len() > 1 {
+    let has_setups = alike.len() > 1 && !by_group;
+    if has_setups {
         let id = |number: usize| {
             SETUPS
                 .get(number)
@@ -178,33 +187,36 @@ fn table(file: &str, channels: &[Channel], mark: Option<(&Channel, Turning)>) ->
             .collect();
         let _ = writeln!(text, "setups = {{ {} }}", entries.join(", "));
     }
-    let is_unique = |name: &str| sensors.iter().filter(|channel| channel.name == name).count() == 1;
-    let path = |name: &str| {
-        if alike.len() > 1 || first.is_empty() || is_unique(name) { name.to_owned() } else { format!("{first}/{name}") }
+    let is_unique = |name: &str| channels.iter().filter(|channel| channel.name == name).count() == 1;
+    let path = |channel: &Channel| {
+        if has_setups || is_unique(&channel.name) { channel.name.clone() } else { channel.path() }
     };
-    let entries: Vec<String> =
-        names.iter().enumerate().map(|(number, name)| format!("S{} = {}", number + 1, quoted(&path(name)))).collect();
-    let _ = writeln!(text, "channels = {{ {} }}", entries.join(", "));
+    let chosen: Vec<&Channel> = sensors.iter().copied().filter(|channel| by_group || channel.group == first).collect();
+    let entry = |(number, channel): (usize, &&Channel)| format!("S{} = {}", number + 1, quoted(&path(channel)));
+    let _ = writeln!(text, "channels = {{ {} }}", chosen.iter().enumerate().map(entry).collect::<Vec<_>>().join(", "));
     match mark {
         Some((mark, Turning::Angle)) => {
             let unit = mark.unit.clone().filter(|unit| unit::known(unit).is_some()).unwrap_or_else(|| "deg".into());
-            let _ = writeln!(text, "angle = {{ channel = {}, unit = {} }}", quoted(&mark.name), quoted(&unit));
+            let _ = writeln!(text, "angle = {{ channel = {}, unit = {} }}", quoted(&path(mark)), quoted(&unit));
         }
         Some((mark, Turning::Pulses { threshold, hysteresis })) => {
             let _ = writeln!(
                 text,
                 "marker = {{ channel = {}, threshold = {threshold:?}, hysteresis = {hysteresis:?}, edge = \"rising\" }}",
-                quoted(&mark.name)
+                quoted(&path(mark))
             );
         }
         None => text.push_str("# the channel of the once-per-turn mark was not found: marker = { channel = \"…\" }\n"),
     }
-    let of_group = || sensors.iter().filter(|channel| channel.group == first);
-    if of_group().any(|channel| channel.unit.as_deref().and_then(unit::known).is_none()) {
+    let units = || chosen.iter().map(|channel| channel.unit.as_deref().and_then(unit::known));
+    if units().any(|unit| unit.is_none()) {
         text.push_str("# the file has no unit for all of them; write theirs\nunit = \"um\"\n");
     }
+    if units().any(|unit| matches!(unit, Some(Known::Volts(_)))) {
+        text.push_str("# voltages: give the sensors of [rig] unit = \"V\" and um_per_volt\n");
+    }
     let has_time = channels.iter().any(|channel| channel.group == first && is_time(channel));
-    if !has_time && of_group().any(|channel| channel.rate_hz.is_none()) {
+    if !has_time && chosen.iter().any(|channel| channel.rate_hz.is_none()) {
         text.push_str("# the file has no sampling rate; write yours\n# sample_rate_hz = 5120\n");
     }
     text

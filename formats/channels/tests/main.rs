@@ -5,5 +5,6 @@ mod conformance;
 mod mutations;
 mod real_files;
 mod references;
+mod speed;
 mod support;
 mod turns;
