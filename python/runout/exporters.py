@@ -21,6 +21,26 @@ class Hdf5:
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
+class X3p:
+    """Writes the surface as X3P (ISO 25178-72), heights as f64"""
+
+    plugin: ClassVar[str] = "x3p"
+
+    path: str
+    """The file to write, ending in `.x3p`. Of a part its wall, unrolled at the nominal radius."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Sdf:
+    """Writes the surface as SDF (ISO 25178-71), binary, heights as f64"""
+
+    plugin: ClassVar[str] = "sdf"
+
+    path: str
+    """The file to write, ending in `.sdf`. Of a part its wall, unrolled at the nominal radius."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
 class Parquet:
     """The tables of a result, one file each"""
 

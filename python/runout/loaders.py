@@ -30,15 +30,28 @@ class Hdf5:
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class HeightMap:
-    """Heights of a surface on a grid, from HDF5 (runout-surface, version 1)"""
+    """Heights of a surface on a grid, or a profile: X3P, SDF, SUR, HDF5, text"""
 
     plugin: ClassVar[str] = "height-map"
 
     follow_links: Union[bool, None] = None
-    """Follows external links, virtual data sets and data in other files, all of which are then inputs. Default: false."""
+    """HDF5: follows external links, virtual data sets and data in other files, all of which are then inputs. Default: false."""
+
+    layer: Union[str, None] = None
+    """Name or number, from 1, of the map in a file that holds several; without it the first one."""
 
     path: str
-    """HDF5 file with the root attribute `format = "runout-surface"` and the dataset `height_nm`, relative to the TOML."""
+    """File with heights on a grid, or a profile, relative to the TOML: X3P (ISO 25178-72), SDF (ISO 25178-71), SUR (Digital Surf),
+    HDF5 (runout-surface, version 1), or text (`x y z`, or a row of heights a line). Its first bytes decide."""
+
+    step_x_mm: Union[float, None] = None
+    """Distance of the columns of a matrix as text that does not give it, in mm."""
+
+    step_y_mm: Union[float, None] = None
+    """Distance of its rows, in mm; without it that of its columns."""
+
+    unit: Union[str, None] = None
+    """Unit of the heights of a file that names none; of text also that of its coordinates: m, mm, um, nm, in, mil."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -129,16 +142,27 @@ class Channels:
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Points:
-    """Measured points from CSV or Parquet, for any separator of points"""
+    """Measured points from text, XLSX or Parquet, for any separator of points"""
 
     plugin: ClassVar[str] = "points"
 
+    axis: Union[Union[Literal['x'], Literal['y'], Literal['z']], None] = None
+    """Direction near which the axis of the part lies, of coordinates `x_mm`, `y_mm`, `z_mm` for a separator that takes places
+    about an axis (`angle_deg`, `radius_mm`, `z_mm`). The axis is found from the points; without the key its direction too."""
+
     columns: Union[Mapping[str, Any], None] = None
-    """The file's names of columns that differ from the separator's: `columns = { "ΔX" = "dx_mm" }`."""
+    """The file's names of columns that differ from the separator's: `columns = { "ΔX" = "dx_mm" }`. Names that differ by the unit
+    alone (`dx_um`, `dx [µm]` for `dx_mm`) are found and converted."""
+
+    names: Union[Sequence[str], None] = None
+    """Names of the columns of a text without a header, in their order: `names = ["x_mm", "y_mm", "z_mm"]`."""
 
     path: str
-    """CSV or Parquet file with one row a point, relative to the TOML. The separator says which columns it takes; `check` lists
-    them. CSV is separated by comma, semicolon or tab; the last two allow a decimal comma."""
+    """CSV, XLSX or Parquet file with one row a point, relative to the TOML. The separator says which columns it takes; `check`
+    lists them. Text is separated by comma, semicolon, tab or blanks; all but the first allow a decimal comma."""
+
+    sheet: Union[str, None] = None
+    """Sheet of an XLSX file; without it the first one."""
 
     where: Union[Mapping[str, Any], None] = None
     """Only rows with these values are read: `where = { a_deg = 0 }`."""

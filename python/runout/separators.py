@@ -358,3 +358,35 @@ class FlyCutting:
 
     std_nm: Union[float, None] = None
     """Standard uncertainty of a height, in nm, where it is not that of the file."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class AsMeasured:
+    """Nothing is separated: values of a height map, a profile, a circle or a cylinder as measured"""
+
+    plugin: ClassVar[str] = "as-measured"
+
+    crop: Union[Mapping[str, Any], None] = None
+    """The part that is evaluated, of a height map or a profile; without it all of it."""
+
+    degree: Union[int, None] = None
+    """Degree of `form = "polynomial"`, 1 to 8; without it 2."""
+
+    form: Union[Union[Literal['none'], Literal['plane'], Literal['polynomial'], Literal['cylinder'], Literal['sphere']], None] = None
+    """Form that is removed by least squares, of a height map or a profile; without it the plane, or the line of a profile."""
+
+    max_order: Union[int, None] = None
+    """Highest order (undulations per revolution) that is fitted to each circle; without it 500, or what its points carry."""
+
+    object: Union[Union[Literal['height-map'], Literal['profile'], Literal['roundness'], Literal['cylinder']], None] = None
+    """What the points are of; without it a height map."""
+
+    outlier_mad: Union[float, None] = None
+    """Leaves out points further than this many median absolute deviations from the median of their neighbours (of a circle: from
+    its fit). Without it every point stays."""
+
+    radius_mm: Union[float, None] = None
+    """Nominal radius of a circle or a cylinder, in mm; without it the mean radius where the points have one."""
+
+    voids: Union[Union[Literal['mask'], Literal['fill']], None] = None
+    """What becomes of points of a height map that have no height, or whose height is left out; without it they are masked."""

@@ -18,8 +18,10 @@ const FLAT: f64 = 1e6;
 /// What was removed.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Removed {
-    /// Its name: "least-squares sphere of radius 10.0021 mm removed".
+    /// Its name, which does not depend on the data: "least-squares sphere removed".
     pub name: String,
+    /// What was found, behind the name: ", radius 10.0021 mm". Empty where there is nothing to say.
+    pub found: String,
     /// Radius and direction of it.
     pub values: Vec<NamedValue>,
 }
@@ -30,7 +32,7 @@ pub(crate) struct Removed {
 /// When the points do not determine it.
 pub(crate) fn remove(grid: &mut HeightGrid, config: &AsMeasuredConfig, object: &str) -> Result<Removed> {
     let is_profile = grid.rows() == 1;
-    let named = |name: String| Removed { name, values: Vec::new() };
+    let named = |name: String| Removed { name, found: String::new(), values: Vec::new() };
     match config.form.unwrap_or(FormRemoval::Plane) {
         FormRemoval::None => Ok(named("no form removed".into())),
         form @ (FormRemoval::Plane | FormRemoval::Polynomial) => {
@@ -82,7 +84,11 @@ fn quadric(grid: &mut HeightGrid, form: FormRemoval, is_profile: bool, object: &
     let radius_mm = 1.0 / found.curvature();
     let extent_mm = grid.step_x_mm * grid.columns as f64 + grid.step_y_mm * grid.rows() as f64;
     if radius_mm.abs() > FLAT * extent_mm {
-        return Ok(Removed { name: format!("least-squares {name} removed, which is flat"), values: Vec::new() });
+        return Ok(Removed {
+            name: format!("least-squares {name} removed"),
+            found: ", which is flat".into(),
+            values: Vec::new(),
+        });
     }
     let side = if radius_mm > 0.0 { "outer" } else { "inner" };
     let value = |symbol: &str, value: f64, unit: &str, about: String| {
@@ -96,7 +102,11 @@ fn quadric(grid: &mut HeightGrid, form: FormRemoval, is_profile: bool, object: &
             .axis_deg()
             .map(|axis| value("axis", axis, "deg", "direction of the cylinder's axis from x towards y".into())),
     );
-    Ok(Removed { name: format!("least-squares {name} of radius {:.6} mm removed", radius_mm.abs()), values })
+    Ok(Removed {
+        name: format!("least-squares {name} removed"),
+        found: format!(", radius {:.6} mm", radius_mm.abs()),
+        values,
+    })
 }
 
 /// A row without its polynomial of a degree.

@@ -114,7 +114,7 @@ pub(crate) fn staged(mut grid: HeightGrid, config: &AsMeasuredConfig, object: &s
         );
     }
     let removed = remove(&mut grid, config, object)?;
-    stages.push(Stage { name: "form", setting: removed.name.clone(), points: measured });
+    stages.push(Stage { name: "form", setting: format!("{}{}", removed.name, removed.found), points: measured });
     let mut staged = Staged {
         reference: removed.name,
         values: removed.values,
