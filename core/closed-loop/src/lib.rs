@@ -35,6 +35,7 @@
 //! # Ok::<(), runout_error::Error>(())
 //! ```
 
+mod candidates;
 pub mod closed_loop;
 mod combinations;
 mod confounded;

@@ -4,6 +4,9 @@ use runout_core::Complex64;
 
 use super::{About, ActsOn, Alterations, Predicted, RigKey, SpindleEffect, parameter};
 
+/// A channel in another unit than declared (mil, mm, inch, nm), or in another range.
+const UNITS: [f64; 6] = [3.0, 10.0, 25.4, 100.0, 1e3, 2.54e4];
+
 /// A sensor's relative gain.
 pub(crate) struct SensorGain;
 
@@ -24,6 +27,10 @@ impl SpindleEffect for SensorGain {
     fn partials(&self, target: usize, predicted: &Predicted) -> Vec<Vec<Complex64>> {
         let gain = 1.0 + predicted.alterations.sensors[target].gain;
         vec![predicted.each(|reading| reading.sensor == target, |_, at| predicted.readings[at] / gain)]
+    }
+
+    fn far_values(&self) -> Vec<f64> {
+        UNITS.iter().flat_map(|unit| [unit - 1.0, unit.recip() - 1.0]).collect()
     }
 
     fn rig_key(&self) -> Option<RigKey> {
