@@ -186,6 +186,10 @@ impl Model for SpindleModel {
         self.traced.kind(effect).is_possible(values)
     }
 
+    fn size(&self, effect: usize, values: &[f64]) -> f64 {
+        self.traced.kind(effect).size(values)
+    }
+
     fn start(&self, effect: usize, applied: &[Setting]) -> Option<Vec<f64>> {
         let (kind, place) = (self.traced.kind(effect), &self.traced.places[effect]);
         let values = kind.far_values();

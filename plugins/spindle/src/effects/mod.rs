@@ -35,7 +35,7 @@ use std::sync::Arc;
 use runout_core::{
     Complex64,
     effects::EffectEntry,
-    model::{Parameter, diagnosis::Estimated},
+    model::{Parameter, diagnosis::Estimated, in_tolerances},
     rig::Rig,
 };
 
@@ -98,6 +98,11 @@ pub trait SpindleEffect: Send + Sync {
     /// Whether its parameters can have these values.
     fn is_possible(&self, _values: &[f64]) -> bool {
         true
+    }
+
+    /// How unusual these values are: the largest, in tolerances; a factor counts by its logarithm.
+    fn size(&self, values: &[f64]) -> f64 {
+        in_tolerances(&self.about().parameters, values)
     }
 
     /// Values of its only parameter at which a fit may begin besides 0: an angle that is far off turns high orders by whole periods.
@@ -244,6 +249,14 @@ pub enum RigKey {
 pub fn parameter(name: &str, unit: &str, tolerance: f64) -> Parameter {
     Parameter { name: name.into(), unit: unit.into(), tolerance }
 }
+
+/// Size of a gain, in tolerances: that of its logarithm, so that the inverse gain of another sensor is as large.
+fn size_of_gain(values: &[f64]) -> f64 {
+    values.iter().map(|gain| gain.ln_1p().abs() / GAIN_TOLERANCE).fold(0.0, f64::max)
+}
+
+/// Usual error of a gain.
+const GAIN_TOLERANCE: f64 = 0.01;
 
 /// ∂(angle in rad)/∂(angle in degrees).
 const RAD_PER_DEG: f64 = std::f64::consts::PI / 180.0;

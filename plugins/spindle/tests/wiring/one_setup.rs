@@ -9,8 +9,18 @@ fn mistakes_of_one_setup_are_found_and_corrected() {
     for (seed, effect, mistake, advice) in [
         (1, r#"{"plugin":"sensor-sign","targets":["S2"],"setups":["b"]}"#, "sensor-sign S2 b", "opposite sign"),
         (2, r#"{"plugin":"sensor-sign","targets":["S5"],"setups":["a"]}"#, "sensor-sign S5 a", "opposite sign"),
-        (3, r#"{"plugin":"sensors-swapped","targets":["S1","S3"],"setups":["c"]}"#, "sensors-swapped S1 S3 c", "swapped"),
-        (4, r#"{"plugin":"sensors-swapped","targets":["S2","S6"],"setups":["b"]}"#, "sensors-swapped S2 S6 b", "swapped"),
+        (
+            3,
+            r#"{"plugin":"sensors-swapped","targets":["S1","S3"],"setups":["c"]}"#,
+            "sensors-swapped S1 S3 c",
+            "swapped",
+        ),
+        (
+            4,
+            r#"{"plugin":"sensors-swapped","targets":["S2","S6"],"setups":["b"]}"#,
+            "sensors-swapped S2 S6 b",
+            "swapped",
+        ),
         (5, r#"{"plugin":"rotation-reversed","setups":["b"]}"#, "rotation-reversed b", "turns the other way"),
     ] {
         let (found, [before, after]) = names(&six(seed, &format!("[{effect}]")), &[mistake], &[]);
