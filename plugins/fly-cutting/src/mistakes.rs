@@ -37,9 +37,10 @@ impl FlyCutting {
     fn share(&self, points: &Points) -> Option<f64> {
         let (mut heights, _) = Heights::new(points, &self.0).ok()?;
         heights.height_nm = heights.levelled_nm();
-        let rms = (heights.height_nm.iter().map(|height| height * height).sum::<f64>() / heights.len() as f64).sqrt();
-        let left = CutModel::new(&self.0, &heights, &[]).fit(&[]).ok()?.remainder().rms;
-        (rms > 0.0).then_some(left / rms)
+        let rms_nm =
+            (heights.height_nm.iter().map(|height| height * height).sum::<f64>() / heights.len() as f64).sqrt();
+        let left_um = CutModel::new(&self.0, &heights, &[]).fit(&[]).ok()?.remainder().rms;
+        (rms_nm > 0.0).then_some(1e3 * left_um / rms_nm)
     }
 }
 
@@ -70,6 +71,7 @@ mod tests {
 
     fn said(points: &Points) -> Option<String> {
         let separator = toml::from_str::<crate::config::FlyCuttingConfig>(CUT).unwrap().separator().unwrap();
+        println!("simulated, the cut leaves {:.3?} of the map", separator.share(points));
         let remarks = separator.separate(points).unwrap().remarks;
         remarks.into_iter().find(|remark| remark.starts_with("it looks as if"))
     }
