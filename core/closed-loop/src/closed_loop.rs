@@ -19,20 +19,14 @@ use super::{
 };
 use runout_consistency::{Check, Test};
 use runout_error::Result;
-use runout_numerics::least_squares::{dot, orthonormal};
+use runout_numerics::least_squares::orthonormal;
 
 /// Candidates whose joint refits differ by less than this, in BIC, cannot be distinguished.
 const SAME_BIC: f64 = 10.0;
 /// Refits whose BIC differs by less than this share are equal up to rounding.
 pub(super) const SAME: f64 = 1e-9;
-/// Candidates of which a joint refit is tried, and the least share of the best linear gain that they must promise.
-const SHORTLIST: (usize, f64) = (6, 0.2);
 /// Candidates that explain most beside correlated errors, which join that list.
 const BESIDE_CORRELATED: usize = 4;
-/// Candidates whose gains differ by less than this share to first order have one signature.
-const SAME_SIGNATURE: f64 = 1e-6;
-/// Effects of single parts on that list at most.
-const PARTS_LISTED: usize = 2;
 /// An effect of a small part of the data counts as so many candidates, which asks for about 18 more of χ²: the noise of a part is known
 /// less well than that of all.
 const OF_A_PART: usize = 10_000;
@@ -221,7 +215,9 @@ impl<M: Model> Tracing<'_, M> {
             .filter_map(|effect| Some((*effect, self.model.start(*effect, &current.settings)?)))
             .collect();
         let ranked = self.ranked(current, candidates, &basis, &starts);
-        let mut trials: Vec<(usize, Refit<Remainder>, Evidence)> = Vec::new();
+        let try_out = |tracing: &Self, effect: usize, gain: f64| {
+            tracing.trial(current, [effect, count], starts.get(&effect), gain)
+        };
         let keyed = Keyed::of(&current.fit, &basis);
         let mut beside: Vec<(usize, f64)> = ranked
             .iter()
@@ -232,24 +228,9 @@ impl<M: Model> Tracing<'_, M> {
             .collect();
         beside.sort_by(|a, b| b.1.total_cmp(&a.1));
         let beside: Vec<usize> = beside.into_iter().take(BESIDE_CORRELATED).map(|(effect, _)| effect).collect();
-        for (effect, gain) in self.listed(ranked, &beside) {
-            let parameters = self.model.effects()[effect].parameters.len();
-            let evidence = |after: f64| {
-                self.evidence(effect, before.chi2(), after, &before, before.dof.saturating_sub(parameters), count)
-            };
-            // What promises nothing to first order is not worth a refit.
-            if evidence(before.chi2() - gain).p_value > 0.05 {
-                continue;
-            }
-            let mut settings = current.settings.clone();
-            settings.push(Setting { effect, values: starts.get(&effect).cloned().unwrap_or(vec![0.0; parameters]) });
-            let Ok(trial) = refit(self.model, settings, fixed) else { continue };
-            if trial.settings.last().is_some_and(|last| !self.model.is_possible(effect, &last.values)) {
-                continue;
-            }
-            let evidence = evidence(trial.chi2);
-            trials.push((effect, trial.remainder_only(), evidence));
-        }
+        let [listed, unlisted] = self.listed(ranked, &beside);
+        let mut trials: Vec<(usize, Refit<Remainder>, Evidence)> =
+            listed.into_iter().filter_map(|(effect, gain)| try_out(self, effect, gain)).collect();
         let best = trials.iter().map(|(_, _, evidence)| evidence.delta_bic).fold(f64::INFINITY, f64::min);
         // Of those that are equal up to rounding, the one that the model names first.
         let place = |bic: f64| if bic - best <= SAME * best.abs() { best } else { bic };
@@ -293,6 +274,10 @@ impl<M: Model> Tracing<'_, M> {
         let first = trial.covariance.len() - count;
         let std = (first..first + count).map(|index| (trial.covariance[index][index] * unit).sqrt()).collect();
         let values = trial.settings.last().map(|setting| setting.values.clone()).unwrap_or_default();
+        // Whatever explains as much of what this one takes away may be it, though others came first on the list.
+        let taken = OVERLAP * OVERLAP * (before.chi2() - after.chi2());
+        let as_much = unlisted.into_iter().filter(|(_, gain)| *gain > taken);
+        trials.extend(as_much.filter_map(|(effect, gain)| try_out(self, effect, gain)));
         // BIC counts in units of what each trial leaves; the best one's unit is common to all.
         let alike = trials.into_iter().filter(|(_, other, evidence)| {
             let difference = (other.chi2 - trial.chi2) / unit.max(f64::MIN_POSITIVE);
@@ -307,55 +292,6 @@ impl<M: Model> Tracing<'_, M> {
             alone.push(refit.settings.last().map(|setting| setting.values.clone()).unwrap_or_default());
         }
         Some(Found { members, alone, values, std, evidence, before, after })
-    }
-
-    /// Candidates with what each lowers χ² by, to first order or from where its fit starts, the most first.
-    fn ranked(
-        &self,
-        current: &Refit<M::Fit>,
-        candidates: &[usize],
-        basis: &[Vec<f64>],
-        starts: &BTreeMap<usize, Vec<f64>>,
-    ) -> Vec<(usize, f64)> {
-        let before = current.fit.remainder();
-        let mut ranked: Vec<(usize, f64)> = candidates
-            .iter()
-            .map(|effect| {
-                if self.model.effects()[*effect].parameters.is_empty() {
-                    return (*effect, before.chi2() - self.with(current, *effect, Vec::new()));
-                }
-                let columns = independent(current.fit.signature(*effect), basis);
-                let linear: f64 = columns.iter().map(|column| dot(column, &before.residual).powi(2)).sum();
-                let started =
-                    starts.get(effect).map(|values| before.chi2() - self.with(current, *effect, values.clone()));
-                (*effect, linear.max(started.unwrap_or(linear)))
-            })
-            .collect();
-        ranked.sort_by(|a, b| b.1.total_cmp(&a.1));
-        ranked
-    }
-
-    /// Of ranked candidates, those of which a joint refit is tried: the best, and those that explain most beside correlated errors.
-    fn listed(&self, mut ranked: Vec<(usize, f64)>, beside: &[usize]) -> Vec<(usize, f64)> {
-        let promising = ranked.first().map_or(0.0, |(_, gain)| SHORTLIST.1 * gain);
-        // Effects of single parts are many and alike: they do not crowd out the others.
-        let parts: Vec<usize> = (0..self.model.effects().len()).flat_map(|whole| self.model.parts(whole)).collect();
-        let (mut part_places, mut places, mut last) = (PARTS_LISTED, SHORTLIST.0, f64::INFINITY);
-        ranked.retain(|(effect, gain)| {
-            let is_part = parts.contains(effect) || self.model.is_one_of_many(*effect);
-            if is_part && part_places == 0 {
-                return false;
-            }
-            part_places -= usize::from(is_part);
-            // Effects of one signature share a place: only their fits differ.
-            let takes_place = *gain < last * (1.0 - SAME_SIGNATURE);
-            let has_place = (places > 0 || !takes_place) && *gain >= promising;
-            if has_place && takes_place {
-                (places, last) = (places - 1, *gain);
-            }
-            has_place || beside.contains(effect)
-        });
-        ranked
     }
 
     /// What an effect takes away: the direction in which its fit changed the residual, and its signature where it has more parameters. Of an
@@ -394,13 +330,6 @@ impl<M: Model> Tracing<'_, M> {
         let named = &self.model.effects()[effect];
         self.refused.retain(|refused| !is(refused, named));
         self.refused.push(Refused { effect: named.id.clone(), targets: named.targets.clone(), reason });
-    }
-
-    /// χ² with an effect at some values; infinite where it cannot be applied.
-    fn with(&self, current: &Refit<M::Fit>, effect: usize, values: Vec<f64>) -> f64 {
-        let mut settings = current.settings.clone();
-        settings.push(Setting { effect, values });
-        self.model.fit(&settings).map_or(f64::INFINITY, |fit| fit.remainder().chi2())
     }
 
     /// Limits that ended the search while the data may hold more.

@@ -68,10 +68,8 @@ pub(super) fn same_finding<M: Model>(model: &M, one: usize, other: usize) -> boo
 }
 
 /// χ² per degree of freedom above what noise leaves, up to which an effect is believed though something stays unexplained.
-pub(super) fn may_leave(effects: &[Effect], found: &Found) -> f64 {
-    let parameters = &effects[found.members[0]].parameters;
-    let sizes = found.values.iter().zip(parameters).map(|(value, known)| value.abs() / known.tolerance);
-    let unusual = sizes.fold(UNUSUAL, f64::max) / UNUSUAL;
+pub(super) fn may_leave<M: Model>(model: &M, found: &Found) -> f64 {
+    let unusual = model.size(found.members[0], &found.values).max(UNUSUAL) / UNUSUAL;
     (1.0 - OWN_SHARE) / (unusual * unusual) * excess(&found.before)
 }
 

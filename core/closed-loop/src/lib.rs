@@ -35,6 +35,7 @@
 //! # Ok::<(), runout_error::Error>(())
 //! ```
 
+mod candidates;
 pub mod closed_loop;
 mod combinations;
 mod confounded;
@@ -81,6 +82,11 @@ pub trait Model {
     /// Whether an effect can have these values: a low-pass cannot amplify.
     fn is_possible(&self, _effect: usize, _values: &[f64]) -> bool {
         true
+    }
+
+    /// How unusual an effect with these values is: its largest parameter, in tolerances. A factor counts by its logarithm.
+    fn size(&self, effect: usize, values: &[f64]) -> f64 {
+        in_tolerances(&self.effects()[effect].parameters, values)
     }
 
     /// What ends a list of effects (orders, lines) of which this one is the last, in words: "order 8 is the highest".
@@ -252,6 +258,12 @@ pub struct Parameter {
     pub unit: String,
     /// What could usually be expected of it, in its unit: the standard deviation of its prior.
     pub tolerance: f64,
+}
+
+/// The largest of an effect's values, in the tolerances of its parameters.
+#[must_use]
+pub fn in_tolerances(parameters: &[Parameter], values: &[f64]) -> f64 {
+    values.iter().zip(parameters).map(|(value, known)| value.abs() / known.tolerance).fold(0.0, f64::max)
 }
 
 /// An effect with values of its parameters.

@@ -39,17 +39,15 @@ impl<M: Model> Tracing<'_, M> {
 
     /// Takes back the effects that took only a part of what something unknown does. Says whether there were any.
     pub(super) fn drop_the_least_bad(&mut self) -> bool {
-        let effects = self.model.effects();
         let model = self.model;
-        self.keep(|found| seen_besides(model, found) || excess(&found.after) <= may_leave(effects, found))
+        self.keep(|found| seen_besides(model, found) || excess(&found.after) <= may_leave(model, found))
     }
 
     /// Takes back the effects beside which what is left in the end is no small part, though it may be noise: a small stranger
     /// lets the least bad effect take a part, a small effect leaves nothing.
     pub(super) fn drop_partial(&mut self, last: &Remainder) -> bool {
-        let (effects, left) = (self.model.effects(), excess(last));
-        let model = self.model;
-        self.keep(|found| seen_besides(model, found) || left <= may_leave(effects, found))
+        let (model, left) = (self.model, excess(last));
+        self.keep(|found| seen_besides(model, found) || left <= may_leave(model, found))
     }
 
     /// Takes back the others. Says whether there were any.
@@ -61,7 +59,7 @@ impl<M: Model> Tracing<'_, M> {
                  unexplained",
                 found.before.chi2_per_dof(),
                 found.after.chi2_per_dof(),
-                1.0 + may_leave(self.model.effects(), found)
+                1.0 + may_leave(self.model, found)
             );
             self.refuse(found.members[0], reason);
         }

@@ -2,7 +2,12 @@
 
 use std::ops::Range;
 
-use runout_core::{Error, Result, height_grid::GridPlaces, points::Points};
+use runout_core::{
+    Error, Result,
+    height_grid::GridPlaces,
+    numerics::{height_map::HeightMap, least_squares::dot},
+    points::Points,
+};
 
 use crate::config::FlyCuttingConfig;
 
@@ -125,6 +130,26 @@ impl Heights {
             [fold(f64::INFINITY, f64::min), fold(f64::NEG_INFINITY, f64::max)],
             ends.map(|row| row.map_or(0.0, |row| row.y_mm)),
         ]
+    }
+
+    /// Heights without the plane that fits them best, in nm.
+    pub(crate) fn levelled_nm(&self) -> Vec<f64> {
+        let mut columns = [vec![1.0; self.len()], self.x_mm.clone(), self.y_mm().collect()];
+        for place in 0..columns.len() {
+            let (known, rest) = columns.split_at_mut(place);
+            for column in known.iter() {
+                let share = dot(column, &rest[0]);
+                rest[0].iter_mut().zip(column).for_each(|(entry, column)| *entry -= share * column);
+            }
+            let size = dot(&rest[0], &rest[0]).sqrt().max(f64::MIN_POSITIVE);
+            rest[0].iter_mut().for_each(|entry| *entry /= size);
+        }
+        let mut left = self.height_nm.clone();
+        for column in &columns {
+            let share = dot(column, &left);
+            left.iter_mut().zip(column).for_each(|(entry, column)| *entry -= share * column);
+        }
+        left
     }
 
     /// y of each point.

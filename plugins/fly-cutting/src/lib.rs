@@ -12,6 +12,7 @@ mod diagnose;
 mod effects;
 mod heights;
 mod lines;
+mod mistakes;
 mod model;
 mod outcome;
 mod passes;

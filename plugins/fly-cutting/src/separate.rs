@@ -88,6 +88,7 @@ impl PointSeparator for FlyCutting {
             ));
         }
         remarks.extend(smaller(left.noise_is_known(), left.chi2_per_dof(), left.dof));
+        remarks.splice(..0, self.mistake(points));
         let checks = fit.consistency();
         Ok(Outcome { checks, ..self.fitted_outcome(&measured, (&fit, &fit), &[], remarks)? })
     }
@@ -184,21 +185,7 @@ pub(crate) fn smaller(noise_is_known: bool, chi2_per_dof: f64, dof: usize) -> Op
 pub(crate) fn too_smooth(heights: &Heights, config: &FlyCuttingConfig) -> Option<String> {
     let half_mm = 0.5e-3 * config.feed_um_per_rev;
     let scallop_nm = 1e6 * half_mm * half_mm / (2.0 * config.nose_radius_mm) * (4.0_f64 / 45.0).sqrt();
-    let mut columns = [vec![1.0; heights.len()], heights.x_mm.clone(), heights.y_mm().collect()];
-    for place in 0..columns.len() {
-        let (known, rest) = columns.split_at_mut(place);
-        for column in known.iter() {
-            let share = dot(column, &rest[0]);
-            rest[0].iter_mut().zip(column).for_each(|(entry, column)| *entry -= share * column);
-        }
-        let size = dot(&rest[0], &rest[0]).sqrt().max(f64::MIN_POSITIVE);
-        rest[0].iter_mut().for_each(|entry| *entry /= size);
-    }
-    let mut left = heights.height_nm.clone();
-    for column in &columns {
-        let share = dot(column, &left);
-        left.iter_mut().zip(column).for_each(|(entry, column)| *entry -= share * column);
-    }
+    let left = heights.levelled_nm();
     let sq_nm = (dot(&left, &left) / heights.len().max(1) as f64).sqrt();
     (sq_nm < TOO_SMOOTH * scallop_nm).then(|| {
         format!(

@@ -23,6 +23,8 @@ pub struct Alterations {
     pub lines: Vec<(usize, Option<usize>)>,
     /// Of each channel, the sensor whose declared place it has.
     pub places: Vec<usize>,
+    /// Setups in which alone two channels have each other's declared places.
+    pub swapped_in: Vec<(usize, [usize; 2])>,
     /// Of each setup, the one whose declared clamping it has.
     pub clampings: Vec<usize>,
     /// As the rig declares them, one a sensor: ±1.
@@ -44,6 +46,8 @@ pub struct Alterations {
 pub struct SensorAlteration {
     /// −1 where readings have the opposite sign to that declared, else +1.
     pub sign: f64,
+    /// Setups in which alone readings have the opposite sign.
+    pub reversed_in: Vec<usize>,
     /// Whether it stands half a turn from the declared angle.
     pub opposite: bool,
     /// Whether it looks at the other section.
@@ -153,6 +157,8 @@ pub struct SetupAlteration {
     pub sensors_rad: f64,
     /// Whether the sensors were turned with the part where they are declared to stay, or stayed where they are declared to be turned.
     pub sensors_otherwise: bool,
+    /// Whether the part turned the other way there than in the other setups: the readings come in the opposite order.
+    pub backwards: bool,
     /// Motion over that of the first setup, less 1.
     pub motion: f64,
     /// Uneven speed within the turn.
@@ -179,9 +185,9 @@ impl Harmonic {
     }
 }
 
-/// Gains that a channel may have over the declared one: a wrong range or unit is 10 times off. The bounds are reciprocal, since the gain of
-/// one sensor and the inverse one of its neighbour often explain the same.
-pub(crate) const GAINS: std::ops::RangeInclusive<f64> = 0.05..=20.0;
+/// Gains that a channel may have over the declared one: a wrong unit (inches for µm) is 25400 times off. The bounds are reciprocal, since the
+/// gain of one sensor and the inverse one of its neighbour often explain the same.
+pub(crate) const GAINS: std::ops::RangeInclusive<f64> = 1e-5..=1e5;
 
 /// Share of the motion with which a bracket may move: a sensor that sees next to none of the motion says nothing of it.
 const LARGEST_SHARE: f64 = 0.95;
@@ -200,10 +206,23 @@ impl Alterations {
         self.rotation_reversed
             || self.part_angles_reversed
             || self.sensor_angles_reversed
-            || self.sensors.iter().any(|sensor| sensor.sign < 0.0 || sensor.opposite || sensor.in_other_section)
-            || self.setups.iter().any(|setup| setup.sensors_otherwise)
+            || self.sensors.iter().any(SensorAlteration::is_mistaken)
+            || self.setups.iter().any(|setup| setup.sensors_otherwise || setup.backwards)
+            || !self.swapped_in.is_empty()
             || moved(&self.places)
             || moved(&self.clampings)
+    }
+
+    /// The channel whose declared place a channel has in a setup.
+    #[must_use]
+    pub fn place_in(&self, setup: usize, channel: usize) -> usize {
+        let here = self.swapped_in.iter().filter(|(only, _)| *only == setup);
+        let swapped = here.fold(channel, |channel, (_, [one, other])| match channel {
+            channel if channel == *one => *other,
+            channel if channel == *other => *one,
+            channel => channel,
+        });
+        self.places[swapped]
     }
 
     /// Whether all values are such that readings can be taken back to displacements.
@@ -245,6 +264,7 @@ impl SensorAlteration {
     /// A sensor as declared.
     pub const NONE: Self = Self {
         sign: 1.0,
+        reversed_in: Vec::new(),
         opposite: false,
         in_other_section: false,
         gain: 0.0,
@@ -261,11 +281,18 @@ impl SensorAlteration {
         transfers: Vec::new(),
     };
 
+    /// Whether its sign or its place is not as declared.
+    fn is_mistaken(&self) -> bool {
+        self.sign < 0.0 || !self.reversed_in.is_empty() || self.opposite || self.in_other_section
+    }
+
     /// Reading over displacement in a setup at an order: gain, low-pass and what else the channel does.
     #[must_use]
     pub fn response(&self, setup: usize, order: usize) -> Complex64 {
         let here = self.transfers.iter().filter(|transfer| transfer.setup.is_none_or(|only| only == setup));
-        let gain = Complex64::from(self.sign * (1.0 + self.gain));
+        let reversed = self.reversed_in.iter().filter(|only| **only == setup).count();
+        let sign = if reversed.is_multiple_of(2) { self.sign } else { -self.sign };
+        let gain = Complex64::from(sign * (1.0 + self.gain));
         here.fold(gain, |response, transfer| response * (transfer.at)(order))
     }
 

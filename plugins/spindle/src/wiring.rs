@@ -7,8 +7,8 @@ use runout_core::{Complex64, model::foresight, rig::Rig};
 
 use crate::{
     alterations::Alterations,
-    effects::{ActsOn, Mistake, ordered_pairs, pair_of, pairs},
-    layout::Layout,
+    effects::{Mistake, pair_of, pairs},
+    layout::{Layout, Reading},
     selection::Selection,
     solve::{Blocks, Readings, apply},
 };
@@ -138,9 +138,10 @@ pub(crate) fn far_value(
     best
 }
 
-/// Mistakes of the rig file: the recording holds what was measured.
+/// Mistakes of the rig file: the recording holds what was measured, in all setups alike.
 fn file_mistakes(layout: &Layout) -> Vec<(Mistake, usize)> {
-    single_mistakes(layout).into_iter().filter(|(mistake, _)| !COPIES.contains(mistake)).collect()
+    let of_file = |(mistake, _): &(Mistake, usize)| !COPIES.contains(mistake) && !mistake.is_of_one_setup();
+    single_mistakes(layout).into_iter().filter(of_file).collect()
 }
 
 /// Every mistake at each of its targets.
@@ -148,15 +149,7 @@ fn single_mistakes(layout: &Layout) -> Vec<(Mistake, usize)> {
     let sensors = layout.declared_signs().len();
     let setups = layout.readings.len() / sensors.max(1);
     let each = Mistake::ALL.into_iter().flat_map(|mistake| {
-        let targets: Vec<usize> = match mistake.acts_on() {
-            ActsOn::Sensor => (0..sensors).collect(),
-            ActsOn::SensorPair => pairs(sensors).collect(),
-            ActsOn::SensorCopy => ordered_pairs(sensors).collect(),
-            ActsOn::SetupPair => pairs(setups).collect(),
-            ActsOn::SetupCopy => ordered_pairs(setups).collect(),
-            ActsOn::LaterSetup => (1..setups).collect(),
-            ActsOn::SensorInSetup | ActsOn::Setup | ActsOn::Rig => vec![0],
-        };
+        let targets = mistake.acts_on().targets(sensors, setups);
         let suited = targets.into_iter().filter(move |target| mistake.suits(*target, layout));
         suited.map(move |target| (mistake, target))
     });
@@ -226,16 +219,20 @@ impl<'a> Trial<'a> {
         let order = index + 1;
         let mut matrix = if order == 1 { layout.first_order_matrix() } else { layout.matrix(order) };
         let columns = matrix.len() / layout.readings.len();
+        let backwards = |reading: &Reading| alterations.setups[reading.setup].backwards;
         for (reading, row) in layout.readings.iter().zip(matrix.chunks_exact_mut(columns)) {
             let response = alterations.response(reading, order);
             for entry in row {
-                *entry *= response;
+                *entry = response * if backwards(reading) { entry.conj() } else { *entry };
             }
         }
-        match self.weights {
-            Some(weights) => weights[index].times(&matrix, columns),
-            None => matrix,
+        let mut matrix = self.weights.map_or_else(|| matrix.clone(), |weights| weights[index].times(&matrix, columns));
+        for (_, row) in
+            layout.readings.iter().zip(matrix.chunks_exact_mut(columns)).filter(|(reading, _)| backwards(reading))
+        {
+            row.iter_mut().for_each(|entry| *entry = entry.conj());
         }
+        matrix
     }
 
     /// χ² per degree of freedom with mistakes corrected; `None` where it is above the limit, or nothing is redundant.
@@ -257,7 +254,11 @@ impl<'a> Trial<'a> {
         for (index, readings) in self.readings.iter().enumerate() {
             let matrix = self.matrix(&layout, alterations, index);
             let qr = layout.factor_matrix(matrix.len() / count, &matrix);
-            let fitted = apply(&matrix, &apply(&qr.operator(), readings));
+            let turned = |(value, reading): (&Complex64, &Reading)| {
+                if alterations.setups[reading.setup].backwards { value.conj() } else { *value }
+            };
+            let readings: Vec<Complex64> = readings.iter().zip(&layout.readings).map(turned).collect();
+            let fitted = apply(&matrix, &apply(&qr.operator(), &readings));
             // A real degree of freedom has half of a complex one's square.
             chi2 += 2.0 * readings.iter().zip(fitted).map(|(read, fitted)| (read - fitted).norm_sqr()).sum::<f64>();
             dof += 2 * (count - qr.rank());
@@ -292,17 +293,7 @@ pub(crate) fn warning(
     }
     let rig = &selection.rig;
     let name = |(mistake, target): &(Mistake, usize)| {
-        let ids = match mistake.acts_on() {
-            ActsOn::Sensor => vec![rig.sensors[*target].id.clone()],
-            ActsOn::SensorPair | ActsOn::SensorCopy => {
-                pair_of(*target, rig.sensors.len()).map(|sensor| rig.sensors[sensor].id.clone()).to_vec()
-            }
-            ActsOn::SetupPair | ActsOn::SetupCopy => {
-                pair_of(*target, rig.setups.len()).map(|setup| rig.setups[setup].id.clone()).to_vec()
-            }
-            ActsOn::LaterSetup => vec![rig.setups[*target].id.clone()],
-            ActsOn::SensorInSetup | ActsOn::Setup | ActsOn::Rig => Vec::new(),
-        };
+        let ids = mistake.acts_on().ids(*target, rig);
         format!("`{}`", foresight::name(mistake.id(), &ids))
     };
     let named = |suspect: &Suspect| suspect.mistakes.iter().map(name).collect::<Vec<_>>().join(" and ");

@@ -190,6 +190,15 @@ fn an_angle_of_any_size_does_not_mislead() {
     does_not_mislead(&reversed(campaign(4, &format!("[{}]", angle("S4", -1.0)))), &["sensor-angle S4"]);
 }
 
+/// Angle and delay of either sensor of a section explain as much: none of them is left out of the set, however many candidates there are.
+#[test]
+fn a_delay_of_any_size_does_not_mislead() {
+    for (seed, sensor, delay_us) in [(1, "S4", -184.9), (2, "S1", 60.0), (3, "S3", 15.0)] {
+        let delay = format!(r#"[{{"plugin":"channel-delay","targets":["{sensor}"],"delay_us":{delay_us}}}]"#);
+        does_not_mislead(&reversed(campaign(seed, &delay)), &[&format!("channel-delay {sensor}")]);
+    }
+}
+
 #[test]
 fn two_sets_together_do_not_mislead() {
     let effects = format!("[{},{}]", gain("S1", -0.05), gain("S3", 0.08));

@@ -108,7 +108,7 @@ pub struct Planted {
 }
 
 /// The effects that are planted: their ids, and those of a single setup.
-pub const EFFECTS: [&str; 36] = [
+pub const EFFECTS: [&str; 40] = [
     "sensor-gain",
     "sensor-angle",
     "sensor-axial-position",
@@ -145,6 +145,10 @@ pub const EFFECTS: [&str; 36] = [
     "chuck-form",
     "clamping-form",
     "electrical-run-out",
+    "sensor-sign-of-setup",
+    "sensors-swapped-of-setup",
+    "rotation-reversed-of-setup",
+    "sensor-unit",
 ];
 /// Those of which two are planted at a time.
 const PAIRED: [&str; 7] = [

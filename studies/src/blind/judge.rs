@@ -269,9 +269,10 @@ impl Judged {
         failures
     }
 
-    /// Whether the loop knows what was planted and the layout distinguishes it from all else.
+    /// Whether the loop knows what was planted and the layout distinguishes it from all else: between members of a set form may be half-way.
     fn is_distinguishable(&self) -> bool {
-        self.campaign.rig == Layout::Six && matches!(self.campaign.kind, Kind::Single | Kind::Pair)
+        let is_known = matches!(self.campaign.kind, Kind::Single | Kind::Pair);
+        self.campaign.rig == Layout::Six && is_known && !self.is_confounded()
     }
 
     /// What was planted, in words.

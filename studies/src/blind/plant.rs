@@ -14,6 +14,9 @@ use runout_spindle::simulate::{
 use super::draw::Planted;
 use crate::chance::Chance;
 
+/// Samples a turn with which a digital low-pass is the analogue one at the orders of the form.
+const FINE_SAMPLES: usize = 2048;
+
 fn planted(id: &'static str, target: Option<&String>, parameters: Vec<(&'static str, f64)>, size: String) -> Planted {
     Planted { id, target: target.cloned(), parameters, size, is_also: Vec::new() }
 }
@@ -31,8 +34,13 @@ impl Chance {
             "speed-ripple" => self.speed_ripple(large),
             "speed-ripple-of-setup" => self.speed_ripple_of_setup(large, config),
             "sensor-sign" | "sensors-swapped" | "setups-swapped" | "rotation-reversed" | "part-angle-sign" => {
-                self.mistake(id, config)
+                self.mistake(id, Vec::new(), config)
             }
+            "sensor-sign-of-setup" | "sensors-swapped-of-setup" | "rotation-reversed-of-setup" => {
+                let setup = self.later_setup(config);
+                self.mistake(id.trim_end_matches("-of-setup"), vec![setup], config)
+            }
+            "sensor-unit" => self.another_unit(config),
             "even-order-motion" | "axial-motion" | "asynchronous-line" => self.of_motion(id),
             "channel-delay" | "channel-skew" | "cross-talk" | "channel-ghost" => self.of_channels(id, config),
             "filter-attenuation-2" | "filter-attenuation-4" => self.low_pass(id, config),
@@ -49,7 +57,7 @@ impl Chance {
     }
 
     /// Effects of a sensor.
-    fn of_sensor(&mut self, id: &str, large: bool, config: &SpindleConfig) -> (Effect, Planted) {
+    fn of_sensor(&mut self, id: &str, large: bool, config: &mut SpindleConfig) -> (Effect, Planted) {
         match id {
             "sensor-gain" => {
                 let (target, relative_gain) = (self.sensor(config), self.signed(2e-4, 0.1, large));
@@ -99,8 +107,9 @@ impl Chance {
             "thermal-drift" => self.drift(large, config),
             "sensor-line" => self.pick_up(config),
             _ => {
+                // The simulator's digital filter is the analogue one that the loop knows where it is sampled fast.
+                config.recording.samples_per_rev = FINE_SAMPLES;
                 let (target, cutoff_hz) = (self.sensor(config), self.size(300.0, 2100.0));
-                // The digital filter is not quite the analogue one that the loop finds: no parameter to compare.
                 let planted = planted("filter-attenuation", Some(&target), vec![], format!("{cutoff_hz:.0} Hz"));
                 let effect = FilterAttenuation { targets: vec![target], cutoff_hz, order: 1, declared: false };
                 (Effect::FilterAttenuation(effect), planted)
@@ -204,34 +213,44 @@ impl Chance {
         }
     }
 
-    /// The rig file is wrong.
-    fn mistake(&mut self, id: &str, config: &SpindleConfig) -> (Effect, Planted) {
-        let named = |id: &'static str, targets: &[String]| {
-            let target = (!targets.is_empty()).then(|| targets.join(" "));
+    /// The rig file is wrong, or the recording of a setup.
+    fn mistake(&mut self, id: &str, setups: Vec<String>, config: &SpindleConfig) -> (Effect, Planted) {
+        let named = |id: &'static str, targets: &[String], setups: &[String]| {
+            let target = (targets.len() + setups.len() > 0).then(|| [targets, setups].concat().join(" "));
             planted(id, target.as_ref(), vec![], String::new())
         };
         let declared = false;
         match id {
             "sensor-sign" => {
                 let targets = vec![self.sensor(config)];
-                let planted = named("sensor-sign", &targets);
-                (Effect::SensorSign(SensorSign { targets, declared }), planted)
+                let planted = named("sensor-sign", &targets, &setups);
+                (Effect::SensorSign(SensorSign { targets, setups, declared }), planted)
             }
             "sensors-swapped" => {
                 let targets = self.two(config.rig.sensors.len()).map(|index| config.rig.sensors[index].id.clone());
-                let planted = named("sensors-swapped", &targets);
-                (Effect::SensorsSwapped(SensorsSwapped { targets, declared }), planted)
+                let planted = named("sensors-swapped", &targets, &setups);
+                (Effect::SensorsSwapped(SensorsSwapped { targets, setups, declared }), planted)
             }
             "setups-swapped" => {
                 let targets = self.two(config.rig.setups.len()).map(|index| config.rig.setups[index].id.clone());
-                let planted = named("setups-swapped", &targets);
+                let planted = named("setups-swapped", &targets, &[]);
                 (Effect::SetupsSwapped(SetupsSwapped { targets, declared }), planted)
             }
             "rotation-reversed" => {
-                (Effect::RotationReversed(RotationReversed { declared }), named("rotation-reversed", &[]))
+                let planted = named("rotation-reversed", &[], &setups);
+                (Effect::RotationReversed(RotationReversed { setups, declared }), planted)
             }
-            _ => (Effect::PartAngleSign(PartAngleSign { declared }), named("part-angle-sign", &[])),
+            _ => (Effect::PartAngleSign(PartAngleSign { declared }), named("part-angle-sign", &[], &[])),
         }
+    }
+
+    /// A channel in mil, mm, nm or volts of ten times the range.
+    fn another_unit(&mut self, config: &SpindleConfig) -> (Effect, Planted) {
+        let (target, factor) = (self.sensor(config), [1.0 / 25.4, 1e-3, 1e3, 0.1, 10.0][self.below(5)]);
+        let (relative_gain, size) = (factor - 1.0, format!("{factor:.3} times"));
+        let planted = planted("sensor-gain", Some(&target), vec![("gain", relative_gain)], size);
+        let (targets, setups, declared) = (vec![target], Vec::new(), false);
+        (Effect::SensorGain(SensorGain { targets, relative_gain, setups, declared }), planted)
     }
 
     /// Two different places among `count`, the first one before the second.

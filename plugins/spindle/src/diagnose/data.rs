@@ -342,7 +342,8 @@ impl StationData {
         let unweighted = || Blocks::identity(self.readings.count / setups, setups);
         let weights = self.freed(alterations).map_or(&self.weights, |freed| &freed.weights);
         let weights = weights.as_ref().map_or_else(unweighted, |weights| weights[order - 1].clone());
-        weights.with_columns_scaled(response).with_shares(&alterations.cross_talk)
+        let weights = weights.with_columns_scaled(response).conjugate_in(|setup| alterations.setups[setup].backwards);
+        weights.with_shares(&alterations.cross_talk)
     }
 
     /// Noise of the residual's degrees of freedom, by order from 1, as a standard deviation of weighted residuals: `corrected` are the

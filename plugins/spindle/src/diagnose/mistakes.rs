@@ -64,7 +64,11 @@ impl SpindleModel {
             (Mistake::SensorsSwapped, "sensors", sensor_ids, sensors, &alterations.places),
             (Mistake::SetupsSwapped, "setups", setup_ids, setups, &alterations.clampings),
         ] {
-            let mut swaps: Vec<_> = diagnosis.added.iter_mut().filter(|added| added.effect == mistake.id()).collect();
+            let mut swaps: Vec<_> = diagnosis
+                .added
+                .iter_mut()
+                .filter(|added| added.effect == mistake.id() && added.targets.len() == 2)
+                .collect();
             if swaps.len() < 2 {
                 continue;
             }

@@ -24,13 +24,12 @@ use runout_core::{
         closed_loop::{self, Settings},
         diagnosis::{Blind, Estimated, LostOrders, Unexplained, Verdict},
     },
-    rig::Rig,
     separation::NOTHING_SEPARATED,
     stage::{Station, StationDiagnosis},
 };
 
 use crate::{
-    effects::{ActsOn, Alterations, SpindleEffect, TurnEvidence, ordered_pairs, pair_of, pairs},
+    effects::{ActsOn, Alterations, SpindleEffect, TurnEvidence},
     layout::Layout,
     selection::Selection,
     sizes, wiring,
@@ -138,11 +137,15 @@ fn places(
         if effect.is_declared(layout, second_order) {
             continue;
         }
-        let suited = targets(about.acts_on, rig).into_iter().filter(|(index, _)| effect.suits(*index, layout));
-        places.extend(suited.map(|(index, targets)| data::Place {
-            kind,
-            index,
-            effect: Effect { id: about.id.into(), targets, parameters: about.parameters.clone() },
+        let targets = about.acts_on.targets(rig.sensors.len(), rig.setups.len());
+        let suited = targets.into_iter().filter(|index| effect.suits(*index, layout));
+        places.extend(suited.map(|index| {
+            let targets = about.acts_on.ids(index, rig);
+            data::Place {
+                kind,
+                index,
+                effect: Effect { id: about.id.into(), targets, parameters: about.parameters.clone() },
+            }
         }));
     }
     places
@@ -168,33 +171,6 @@ fn declared_by(
     places.get(effect).and_then(of).unwrap_or_default()
 }
 
-/// Where an effect may act: its target as [`SpindleEffect`] counts it, and the ids.
-fn targets(acts_on: ActsOn, rig: &Rig) -> Vec<(usize, Vec<String>)> {
-    let sensor = |index: usize| rig.sensors[index].id.clone();
-    let setup = |index: usize| rig.setups[index].id.clone();
-    let (sensors, setups) = (rig.sensors.len(), rig.setups.len());
-    match acts_on {
-        ActsOn::Sensor => (0..sensors).map(|index| (index, vec![sensor(index)])).collect(),
-        // Of one setup, it is the sensor's everywhere.
-        ActsOn::SensorInSetup if setups < 2 => Vec::new(),
-        ActsOn::SensorInSetup => {
-            let both = |target: usize| (target, vec![sensor(target / setups), setup(target % setups)]);
-            (0..sensors * setups).map(both).collect()
-        }
-        ActsOn::Setup => (0..setups).map(|index| (index, vec![setup(index)])).collect(),
-        ActsOn::LaterSetup => (1..setups).map(|index| (index, vec![setup(index)])).collect(),
-        ActsOn::SensorPair => pairs(sensors).map(|pair| (pair, pair_of(pair, sensors).map(sensor).to_vec())).collect(),
-        ActsOn::SensorCopy => {
-            ordered_pairs(sensors).map(|pair| (pair, pair_of(pair, sensors).map(sensor).to_vec())).collect()
-        }
-        ActsOn::SetupCopy => {
-            ordered_pairs(setups).map(|pair| (pair, pair_of(pair, setups).map(setup).to_vec())).collect()
-        }
-        ActsOn::SetupPair => pairs(setups).map(|pair| (pair, pair_of(pair, setups).map(setup).to_vec())).collect(),
-        ActsOn::Rig => vec![(0, Vec::new())],
-    }
-}
-
 impl Model for SpindleModel {
     type Fit = SpindleFit;
 
@@ -208,6 +184,10 @@ impl Model for SpindleModel {
 
     fn is_possible(&self, effect: usize, values: &[f64]) -> bool {
         self.traced.kind(effect).is_possible(values)
+    }
+
+    fn size(&self, effect: usize, values: &[f64]) -> f64 {
+        self.traced.kind(effect).size(values)
     }
 
     fn start(&self, effect: usize, applied: &[Setting]) -> Option<Vec<f64>> {

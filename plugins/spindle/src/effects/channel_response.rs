@@ -13,11 +13,17 @@
 
 use std::f64::consts::SQRT_2;
 
-use runout_core::{Complex64, model::diagnosis::Estimated};
+use runout_core::{
+    Complex64,
+    model::{diagnosis::Estimated, in_tolerances},
+};
 
 use crate::alterations::GAINS;
 
-use super::{About, ActsOn, Alterations, Predicted, RAD_PER_DEG, SpindleEffect, Transfer, parameter};
+use super::{
+    About, ActsOn, Alterations, GAIN_TOLERANCE, Predicted, RAD_PER_DEG, SpindleEffect, Transfer, parameter,
+    size_of_gain,
+};
 
 /// An effect of one value that is a response of channels.
 pub(crate) struct ChannelResponse {
@@ -112,7 +118,7 @@ impl SpindleEffect for ChannelResponse {
             Response::Delay(direction) if direction < 0.0 => parameter("angle", "deg", 0.3),
             // Half a sample of 512 a turn.
             Response::Delay(_) => parameter("delay", "deg", 0.3),
-            Response::Gain => parameter("gain", "1", 0.01),
+            Response::Gain => parameter("gain", "1", GAIN_TOLERANCE),
         };
         About { id: self.id, does: self.does, acts_on: self.acts_on, parameters: vec![parameters] }
     }
@@ -142,6 +148,13 @@ impl SpindleEffect for ChannelResponse {
             self.response.at(order, value)[1] * predicted.readings[at]
         };
         vec![predicted.each(on, change)]
+    }
+
+    fn size(&self, values: &[f64]) -> f64 {
+        match self.response {
+            Response::Gain => size_of_gain(values),
+            _ => in_tolerances(&self.about().parameters, values),
+        }
     }
 
     fn first_order_like(&self) -> Option<&'static str> {

@@ -17,6 +17,7 @@ impl Alterations {
             sensors: vec![SensorAlteration::NONE; count(|reading| reading.sensor)],
             setups: vec![SetupAlteration::default(); count(|reading| reading.setup)],
             places: (0..count(|reading| reading.sensor)).collect(),
+            swapped_in: Vec::new(),
             clampings: (0..count(|reading| reading.setup)).collect(),
             declared_signs: layout.declared_signs(),
             rotation_reversed: false,
@@ -62,7 +63,12 @@ impl Alterations {
             let last_first = self.cross_talk.iter().rev();
             last_first.for_each(|CrossTalk { from, to, share }| readings[*to] += readings[*from] * *share);
         }
-        recorded.iter_mut().zip(&layout.readings).for_each(|(value, reading)| *value *= self.response(reading, order));
+        recorded.iter_mut().zip(&layout.readings).for_each(|(value, reading)| {
+            if self.setups[reading.setup].backwards {
+                *value = value.conj();
+            }
+            *value *= self.response(reading, order);
+        });
         recorded
     }
 
@@ -80,6 +86,9 @@ impl Alterations {
                 let value = &mut row[index];
                 *value -= sensor.creep_um * share * creep(order, angles);
                 *value /= sensor.response(reading.setup, order);
+                if self.setups[reading.setup].backwards {
+                    *value = value.conj();
+                }
             }
             let curved = sensor.quadratic_per_um != 0.0 || sensor.cubic_per_um2 != 0.0;
             let setup = &self.setups[reading.setup];
@@ -121,6 +130,9 @@ impl Alterations {
                     of_sensors.map(|(sensor, slope)| sensor.response(setup, order) * slope).collect();
                 for (row, one) in matrix.chunks_exact_mut(sensors).zip(&responses) {
                     row.iter_mut().zip(&responses).for_each(|(entry, other)| *entry /= one * other.conj());
+                }
+                if self.setups[setup].backwards {
+                    matrix.iter_mut().for_each(|entry| *entry = entry.conj());
                 }
                 for CrossTalk { from, to, share } in &self.cross_talk {
                     (0..sensors)

@@ -34,11 +34,17 @@ pub enum Mistake {
     SensorInOtherSection,
     /// In a setup the sensors were turned with the part, and are declared to have stayed; or the other way.
     SensorsTurned,
+    /// A reading has the opposite sign in one setup.
+    SensorSignInSetup,
+    /// Two channels hold each other's signals in one setup.
+    SensorsSwappedInSetup,
+    /// The part turns the other way in one setup.
+    RotationReversedInSetup,
 }
 
 impl Mistake {
     /// All of them, the more frequent ones first.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 14] = [
         Self::SensorSign,
         Self::SensorOpposite,
         Self::SetupsSwapped,
@@ -48,6 +54,9 @@ impl Mistake {
         Self::SensorAnglesSign,
         Self::SensorsTurned,
         Self::SensorInOtherSection,
+        Self::SensorSignInSetup,
+        Self::SensorsSwappedInSetup,
+        Self::RotationReversedInSetup,
         Self::SetupRepeated,
         Self::SensorsIdentical,
     ];
@@ -56,13 +65,13 @@ impl Mistake {
     #[must_use]
     pub fn id(self) -> &'static str {
         match self {
-            Self::SensorSign => "sensor-sign",
+            Self::SensorSign | Self::SensorSignInSetup => "sensor-sign",
             Self::SensorOpposite => "sensor-opposite",
-            Self::SensorsSwapped => "sensors-swapped",
+            Self::SensorsSwapped | Self::SensorsSwappedInSetup => "sensors-swapped",
             Self::SensorsIdentical => "sensors-identical",
             Self::SetupsSwapped => "setups-swapped",
             Self::SetupRepeated => "setup-repeated",
-            Self::RotationReversed => "rotation-reversed",
+            Self::RotationReversed | Self::RotationReversedInSetup => "rotation-reversed",
             Self::PartAngleSign => "part-angle-sign",
             Self::SensorAnglesSign => "sensor-angles-sign",
             Self::SensorInOtherSection => "sensor-in-other-section",
@@ -76,12 +85,21 @@ impl Mistake {
         match self {
             Self::SensorSign | Self::SensorOpposite | Self::SensorInOtherSection => ActsOn::Sensor,
             Self::SensorsTurned => ActsOn::LaterSetup,
+            Self::SensorSignInSetup => ActsOn::SensorInSetup,
+            Self::SensorsSwappedInSetup => ActsOn::SensorPairInSetup,
+            Self::RotationReversedInSetup => ActsOn::Setup,
             Self::SensorsSwapped => ActsOn::SensorPair,
             Self::SensorsIdentical => ActsOn::SensorCopy,
             Self::SetupsSwapped => ActsOn::SetupPair,
             Self::SetupRepeated => ActsOn::SetupCopy,
             Self::RotationReversed | Self::PartAngleSign | Self::SensorAnglesSign => ActsOn::Rig,
         }
+    }
+
+    /// Whether it was made in one setup, and the rig file has no key for it.
+    #[must_use]
+    pub fn is_of_one_setup(self) -> bool {
+        matches!(self, Self::SensorSignInSetup | Self::SensorsSwappedInSetup | Self::RotationReversedInSetup)
     }
 
     /// Whether it changes anything at a target of a layout.
@@ -98,7 +116,7 @@ impl Mistake {
                     own.turned_otherwise_rad().sin().hypot(1.0 - own.turned_otherwise_rad().cos()) > 1e-6
                 })
             }
-            _ => true,
+            _ => !self.is_of_one_setup() || layout.readings.iter().any(|reading| reading.setup > 0),
         }
     }
 
@@ -123,6 +141,19 @@ impl Mistake {
                 alterations.sensors[second].sign *=
                     alterations.declared_signs[first] * alterations.declared_signs[second];
             }
+            Self::SensorSignInSetup => {
+                let count = alterations.setups.len();
+                alterations.sensors[target / count].reversed_in.push(target % count);
+            }
+            Self::SensorsSwappedInSetup => {
+                let count = alterations.setups.len();
+                let (pair, setup) = (pair_of(target / count, alterations.sensors.len()), target % count);
+                alterations.swapped_in.push((setup, pair));
+                if pair.map(|sensor| alterations.declared_signs[sensor]).iter().product::<f64>() < 0.0 {
+                    pair.into_iter().for_each(|sensor| alterations.sensors[sensor].reversed_in.push(setup));
+                }
+            }
+            Self::RotationReversedInSetup => alterations.setups[target].backwards ^= true,
             Self::SetupsSwapped => alterations.clampings.swap(setups[0], setups[1]),
             Self::SetupRepeated => alterations.clampings[setups[1]] = alterations.clampings[setups[0]],
             Self::RotationReversed => alterations.rotation_reversed ^= true,
@@ -163,7 +194,11 @@ impl Mistake {
                 let pair = pair_of(target, rig.setups.len());
                 exchanged("setups", pair, setups, pair.map(|setup| rig.setups[setup].id.as_str()))
             }
-            Self::SensorsIdentical | Self::SetupRepeated => Vec::new(),
+            Self::SensorsIdentical
+            | Self::SetupRepeated
+            | Self::SensorSignInSetup
+            | Self::SensorsSwappedInSetup
+            | Self::RotationReversedInSetup => Vec::new(),
             Self::SensorInOtherSection => {
                 let own = &rig.sensors[target];
                 let other = rig.sensors.iter().find(|sensor| sensor.section != own.section);
@@ -203,6 +238,20 @@ impl Mistake {
                 let [first, second] = pair_of(target, rig.setups.len()).map(|setup| &rig.setups[setup].id);
                 Some(format!("setup `{second}` was recorded as `{first}`: record it again, or leave it out"))
             }
+            _ if self.is_of_one_setup() => {
+                let ids = self.acts_on().ids(target, rig);
+                let (setup, sensors) = ids.split_last()?;
+                let what = match (self, sensors) {
+                    (Self::SensorSignInSetup, [sensor]) => format!("the readings of `{sensor}` have the opposite sign"),
+                    (Self::SensorsSwappedInSetup, [one, other]) => {
+                        format!("channels `{one}` and `{other}` are swapped")
+                    }
+                    _ => "the part turns the other way".to_owned(),
+                };
+                Some(format!(
+                    "in setup `{setup}` {what}, and in the others as declared: record it again, or correct the recording"
+                ))
+            }
             _ => None,
         }
     }
@@ -225,13 +274,16 @@ pub fn pairs(count: usize) -> impl Iterator<Item = usize> {
 }
 
 /// Targets of a pair among `count`, in either order.
-pub fn ordered_pairs(count: usize) -> impl Iterator<Item = usize> {
+pub(super) fn ordered_pairs(count: usize) -> impl Iterator<Item = usize> {
     (0..count * count).filter(move |pair| pair / count != pair % count)
 }
 
 impl SpindleEffect for Mistake {
     fn about(&self) -> About {
         let does = match self {
+            Self::SensorSignInSetup => "a mistake in the recording: a reading has the opposite sign in one setup",
+            Self::SensorsSwappedInSetup => "a mistake in the recording: two channels are swapped in one setup",
+            Self::RotationReversedInSetup => "a mistake in the recording: the part turns the other way in one setup",
             Self::SensorSign => "a mistake in the rig: a reading has the opposite sign",
             Self::SensorOpposite => "a mistake in the rig: a sensor stands on the other side of the part",
             Self::SensorsSwapped => "a mistake in the rig: two channels are swapped",

@@ -35,12 +35,14 @@ use std::sync::Arc;
 use runout_core::{
     Complex64,
     effects::EffectEntry,
-    model::{Parameter, diagnosis::Estimated},
+    model::{Parameter, diagnosis::Estimated, in_tolerances},
+    rig::Rig,
 };
 
 pub use crate::alterations::{Alterations, Harmonic, Pattern, PatternOf, SensorAlteration, SetupAlteration, Transfer};
 pub use correct::creep;
-pub use mistakes::{Mistake, ordered_pairs, pair_of, pairs};
+use mistakes::ordered_pairs;
+pub use mistakes::{Mistake, pair_of, pairs};
 pub use predicted::Predicted;
 
 use crate::layout::Layout;
@@ -96,6 +98,11 @@ pub trait SpindleEffect: Send + Sync {
     /// Whether its parameters can have these values.
     fn is_possible(&self, _values: &[f64]) -> bool {
         true
+    }
+
+    /// How unusual these values are: the largest, in tolerances; a factor counts by its logarithm.
+    fn size(&self, values: &[f64]) -> f64 {
+        in_tolerances(&self.about().parameters, values)
     }
 
     /// Values of its only parameter at which a fit may begin besides 0: an angle that is far off turns high orders by whole periods.
@@ -165,6 +172,8 @@ pub enum ActsOn {
     SensorCopy,
     /// Any sensor in any one setup: the target is sensor · (number of setups) + setup.
     SensorInSetup,
+    /// Any two sensors in any one setup: the target is the pair's · (number of setups) + setup.
+    SensorPairInSetup,
     /// Any setup.
     Setup,
     /// Any setup but the first, which the others are counted from.
@@ -175,6 +184,49 @@ pub enum ActsOn {
     SetupCopy,
     /// The rig as a whole.
     Rig,
+}
+
+impl ActsOn {
+    /// Everything that it may act on in a rig of so many sensors and setups.
+    #[must_use]
+    pub fn targets(self, sensors: usize, setups: usize) -> Vec<usize> {
+        match self {
+            Self::Sensor => (0..sensors).collect(),
+            // Of one setup, it is the sensor's everywhere.
+            Self::SensorInSetup | Self::SensorPairInSetup if setups < 2 => Vec::new(),
+            Self::SensorInSetup => (0..sensors * setups).collect(),
+            Self::SensorPairInSetup => {
+                pairs(sensors).flat_map(|pair| (0..setups).map(move |setup| pair * setups + setup)).collect()
+            }
+            Self::SensorPair => pairs(sensors).collect(),
+            Self::SensorCopy => ordered_pairs(sensors).collect(),
+            Self::Setup => (0..setups).collect(),
+            Self::LaterSetup => (1..setups).collect(),
+            Self::SetupPair => pairs(setups).collect(),
+            Self::SetupCopy => ordered_pairs(setups).collect(),
+            Self::Rig => vec![0],
+        }
+    }
+
+    /// Ids of what a target stands for.
+    #[must_use]
+    pub fn ids(self, target: usize, rig: &Rig) -> Vec<String> {
+        let sensor = |index: usize| rig.sensors[index].id.clone();
+        let setup = |index: usize| rig.setups[index].id.clone();
+        let (sensors, setups) = (rig.sensors.len(), rig.setups.len());
+        match self {
+            Self::Sensor => vec![sensor(target)],
+            Self::SensorPair | Self::SensorCopy => pair_of(target, sensors).map(sensor).to_vec(),
+            Self::SensorInSetup => vec![sensor(target / setups), setup(target % setups)],
+            Self::SensorPairInSetup => {
+                let pair = pair_of(target / setups, sensors).map(sensor);
+                pair.into_iter().chain([setup(target % setups)]).collect()
+            }
+            Self::Setup | Self::LaterSetup => vec![setup(target)],
+            Self::SetupPair | Self::SetupCopy => pair_of(target, setups).map(setup).to_vec(),
+            Self::Rig => Vec::new(),
+        }
+    }
 }
 
 /// What a rig declares and effects change.
@@ -197,6 +249,14 @@ pub enum RigKey {
 pub fn parameter(name: &str, unit: &str, tolerance: f64) -> Parameter {
     Parameter { name: name.into(), unit: unit.into(), tolerance }
 }
+
+/// Size of a gain, in tolerances: that of its logarithm, so that the inverse gain of another sensor is as large.
+fn size_of_gain(values: &[f64]) -> f64 {
+    values.iter().map(|gain| gain.ln_1p().abs() / GAIN_TOLERANCE).fold(0.0, f64::max)
+}
+
+/// Usual error of a gain.
+const GAIN_TOLERANCE: f64 = 0.01;
 
 /// ∂(angle in rad)/∂(angle in degrees).
 const RAD_PER_DEG: f64 = std::f64::consts::PI / 180.0;

@@ -18,8 +18,8 @@ impl Layout {
         }
         for reading in &mut layout.readings {
             let (sensor, setup) = (&alterations.sensors[reading.sensor], &alterations.setups[reading.setup]);
-            let place =
-                alterations.clampings[reading.setup] * alterations.places.len() + alterations.places[reading.sensor];
+            let place = alterations.clampings[reading.setup] * alterations.places.len()
+                + alterations.place_in(reading.setup, reading.sensor);
             let declared = &self.readings[place];
             reading.section = declared.section;
             reading.view = declared.view;

@@ -84,6 +84,8 @@ struct SimulatedStream<'a> {
     /// Angle of the spindle at its mark, in turns.
     mark_turns: f64,
     motion_ratio: f64,
+    /// Whether the spindle turns the other way than in the other setups.
+    backwards: bool,
     sensors: Vec<Looking<'a>>,
 }
 
@@ -153,7 +155,8 @@ impl<'a> SimulatedStream<'a> {
         let of_setup = |values: &[(usize, f64)]| -> Vec<f64> {
             values.iter().filter(|(only, _)| *only == setup).map(|(_, value)| *value).collect()
         };
-        let sensors = world.sensors.iter().enumerate().map(|(item, sensor)| {
+        let sensors = clamped_in.channels.iter().enumerate().map(|(item, sensor)| {
+            let sensor = &world.sensors[*sensor];
             let angle =
                 sensor.angle_rad + clamped_in.sensors_rad + of_setup(&sensor.angles_in_setups).iter().sum::<f64>();
             let z_mm = sensor.z_mm + key.z_mm;
@@ -208,6 +211,7 @@ impl<'a> SimulatedStream<'a> {
             late: late.collect(),
             mark_turns: clamped_in.mark_turns,
             motion_ratio: clamped_in.motion_ratio,
+            backwards: clamped_in.backwards,
             sensors: sensors.collect(),
         })
     }
@@ -219,7 +223,8 @@ impl<'a> SimulatedStream<'a> {
         for (lane, angle) in turns.iter_mut().enumerate() {
             *angle = self.spin.turns((start + lane.min(count - 1) as u64) as f64 - *delay_samples);
         }
-        let turn = Phasor::of_turns(&turns.map(|(_, rest)| rest));
+        let forwards = Phasor::of_turns(&turns.map(|(_, rest)| rest));
+        let turn = if self.backwards { forwards.conj() } else { forwards };
         let mut displacement = self.world.motion.at(&turn);
         for value in displacement.iter_mut().flatten() {
             *value *= self.motion_ratio;

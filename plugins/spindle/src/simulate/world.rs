@@ -94,6 +94,10 @@ pub(super) struct TrueSetup {
     pub clamping_form_um: Vec<Complex64>,
     /// What all readings are taken times.
     pub gain: f64,
+    /// Of each channel, the sensor that it records.
+    pub channels: Vec<usize>,
+    /// Whether the spindle turns the other way than in the other setups.
+    pub backwards: bool,
     /// Angle of the spindle at its mark, in turns.
     pub mark_turns: f64,
     /// One a section.
@@ -181,6 +185,8 @@ impl World {
                 motion_ratio: 1.0,
                 clamping_form_um: Vec::new(),
                 gain: 1.0,
+                channels: (0..rig.sensors.len()).collect(),
+                backwards: false,
                 mark_turns: 0.0,
                 clamping: vec![clamping; rig.sections.len()],
                 pole: phase(&mut stream(config.seed, Purpose::Pole, Place { setup: index, ..Place::default() })),

@@ -34,6 +34,16 @@ impl Blocks {
         Self { size, entries }
     }
 
+    /// The conjugate in some setups.
+    #[must_use]
+    pub(crate) fn conjugate_in(mut self, is_in: impl Fn(usize) -> bool) -> Self {
+        let blocks = self.entries.chunks_exact_mut(self.size * self.size).enumerate();
+        for (_, block) in blocks.filter(|(setup, _)| is_in(*setup)) {
+            block.iter_mut().for_each(|entry| *entry = entry.conj());
+        }
+        self
+    }
+
     /// Rows of a block.
     #[must_use]
     pub(crate) fn size(&self) -> usize {

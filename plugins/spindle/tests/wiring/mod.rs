@@ -1,5 +1,6 @@
 //! Mistakes in the rig file, on simulated campaigns: the simulator records what was there, and the rig says something else.
 
+mod one_setup;
 mod places;
 mod units;
 

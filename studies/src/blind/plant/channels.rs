@@ -5,7 +5,7 @@ use runout_spindle::simulate::{
     SensorGain, SetupGain, SpindleConfig,
 };
 
-use super::planted;
+use super::{FINE_SAMPLES, planted};
 use crate::{blind::draw::Planted, chance::Chance};
 
 impl Chance {
@@ -50,7 +50,7 @@ impl Chance {
 
     /// An anti-alias filter of higher order: sampled so fast that the digital filter is the analogue one.
     pub(super) fn low_pass(&mut self, id: &str, config: &mut SpindleConfig) -> (Effect, Planted) {
-        config.recording.samples_per_rev = 2048;
+        config.recording.samples_per_rev = FINE_SAMPLES;
         let (target, cutoff_rev) = (self.sensor(config), self.size(40.0, 400.0));
         let (id, order) =
             if id == "filter-attenuation-2" { ("filter-attenuation-2", 2) } else { ("filter-attenuation-4", 4) };

@@ -1,7 +1,7 @@
 //! What single sensors, setups and the spindle add to the form, or take from it.
 
 use runout_spindle::simulate::{
-    BracketMotion, ChuckForm, ClampingForm, Effect, ElectricalRunOut, ProbeSpot, SpindleConfig,
+    BracketMotion, ChuckForm, ClampingForm, Effect, ElectricalRunOut, Lobes, ProbeSpot, SpindleConfig,
 };
 
 use super::planted;
@@ -29,24 +29,18 @@ impl Chance {
         let (phase_deg, declared) = (self.between(-180.0, 180.0), false);
         let parameters = vec![("amplitude", amplitude_um), ("order", order as f64), ("phase", phase_deg)];
         let size = format!("{amplitude_um:.3} µm at {order}/rev");
-        match id {
-            "chuck-form" => (
-                Effect::ChuckForm(ChuckForm { order, amplitude_um, phase_deg, declared }),
-                planted("chuck-form", None, parameters, size),
-            ),
-            "clamping-form" => {
-                let target = self.later_setup(config);
-                let planted = planted("clamping-form", Some(&target), parameters, size);
-                let targets = vec![target];
-                (Effect::ClampingForm(ClampingForm { targets, order, amplitude_um, phase_deg, declared }), planted)
-            }
-            _ => {
-                let target = self.sensor(config);
-                let planted = planted("electrical-run-out", Some(&target), parameters, size);
-                let targets = vec![target];
-                let run_out = ElectricalRunOut { targets, order, amplitude_um, phase_deg, declared };
-                (Effect::ElectricalRunOut(run_out), planted)
-            }
-        }
+        let target = match id {
+            "chuck-form" => None,
+            "clamping-form" => Some(self.later_setup(config)),
+            _ => Some(self.sensor(config)),
+        };
+        let targets = target.clone().into_iter().collect();
+        let lobes = Lobes { targets, order, amplitude_um, phase_deg, declared };
+        let (id, effect) = match id {
+            "chuck-form" => ("chuck-form", Effect::ChuckForm(ChuckForm(lobes))),
+            "clamping-form" => ("clamping-form", Effect::ClampingForm(ClampingForm(lobes))),
+            _ => ("electrical-run-out", Effect::ElectricalRunOut(ElectricalRunOut(lobes))),
+        };
+        (effect, planted(id, target.as_ref(), parameters, size))
     }
 }

@@ -4,7 +4,7 @@ use runout_core::{fault::Fault, rig::Rotation};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Acts, places, sensor_ids, sensors::on_sensors, setup_ids};
+use super::{Acts, named_setups, places, sensor_ids, sensors::on_sensors, setup_ids};
 use crate::simulate::world::World;
 
 /// Readings have the opposite sign.
@@ -13,6 +13,9 @@ use crate::simulate::world::World;
 pub struct SensorSign {
     /// Ids of sensors.
     pub targets: Vec<String>,
+    /// Ids of the setups in which it is so; all without it.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub setups: Vec<String>,
     /// Always false: what the separation is to know is declared in the pipeline.
     #[serde(default)]
     pub declared: bool,
@@ -24,7 +27,11 @@ impl Acts for SensorSign {
     }
 
     fn apply(&self, world: &mut World, _index: usize) -> Result<(), Fault> {
-        on_sensors(world, &self.targets, |sensor| sensor.chain.gain *= -1.0)
+        let setups = named_setups(world, &self.setups)?;
+        on_sensors(world, &self.targets, |sensor| {
+            sensor.chain.gain *= if setups.is_empty() { -1.0 } else { 1.0 };
+            sensor.gains_in_setups.extend(setups.iter().map(|setup| (*setup, -1.0)));
+        })
     }
 }
 
@@ -34,6 +41,9 @@ impl Acts for SensorSign {
 pub struct SensorsSwapped {
     /// Ids of two sensors.
     pub targets: [String; 2],
+    /// Ids of the setups in which it is so; all without it.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub setups: Vec<String>,
     /// Always false: what the separation is to know is declared in the pipeline.
     #[serde(default)]
     pub declared: bool,
@@ -45,8 +55,14 @@ impl Acts for SensorsSwapped {
     }
 
     fn apply(&self, world: &mut World, _index: usize) -> Result<(), Fault> {
-        let [first, second] = pair(&self.targets, &sensor_ids(world), "sensor")?;
-        world.sensors.swap(first, second);
+        let both = pair(&self.targets, &sensor_ids(world), "sensor")?;
+        let setups = named_setups(world, &self.setups)?;
+        if setups.is_empty() {
+            world.sensors.swap(both[0], both[1]);
+        }
+        for setup in setups {
+            world.setups[setup].channels.swap(both[0], both[1]);
+        }
         Ok(())
     }
 }
@@ -124,6 +140,9 @@ impl Acts for SetupRepeated {
 #[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RotationReversed {
+    /// Ids of the setups in which it is so; all without it.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub setups: Vec<String>,
     /// Always false: what the separation is to know is declared in the pipeline.
     #[serde(default)]
     pub declared: bool,
@@ -135,10 +154,16 @@ impl Acts for RotationReversed {
     }
 
     fn apply(&self, world: &mut World, _index: usize) -> Result<(), Fault> {
-        world.rig.rotation = match world.rig.rotation {
-            Rotation::Ccw => Rotation::Cw,
-            Rotation::Cw => Rotation::Ccw,
-        };
+        let setups = named_setups(world, &self.setups)?;
+        if setups.is_empty() {
+            world.rig.rotation = match world.rig.rotation {
+                Rotation::Ccw => Rotation::Cw,
+                Rotation::Cw => Rotation::Ccw,
+            };
+        }
+        for setup in setups {
+            world.setups[setup].backwards ^= true;
+        }
         Ok(())
     }
 }

@@ -18,7 +18,7 @@ pub use channels::{ChannelDelay, ChannelGhost, ChannelSkew, CrossTalk, IndexOffs
 pub use mistakes::{
     PartAngleSign, RotationReversed, SensorSign, SensorsIdentical, SensorsSwapped, SetupRepeated, SetupsSwapped,
 };
-pub use profiles::{BracketMotion, ChuckForm, ClampingForm, ElectricalRunOut, ProbeSpot};
+pub use profiles::{BracketMotion, ChuckForm, ClampingForm, ElectricalRunOut, Lobes, ProbeSpot};
 pub use sensors::{
     FilterAttenuation, SensorAngle, SensorAxialPosition, SensorGain, SensorLine, SensorNonlinearity, ThermalDrift,
 };

@@ -55,15 +55,18 @@ impl Acts for BracketMotion {
     }
 }
 
-/// A form that turns with the spindle and not with the part; its angle counts from the spindle.
+/// amplitude · cos(order · angle − phase) besides the form.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct ChuckForm {
+pub struct Lobes {
+    /// Ids of the setups (`clamping-form`) or sensors (`electrical-run-out`) that have it; a `chuck-form` is in all of them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub targets: Vec<String>,
     /// Per turn, from 2.
     pub order: usize,
     /// In µm.
     pub amplitude_um: f64,
-    /// Of amplitude · cos(order · angle − phase), in degrees.
+    /// In degrees.
     #[serde(default)]
     pub phase_deg: f64,
     /// Always false: what the separation is to know is declared in the pipeline.
@@ -71,80 +74,64 @@ pub struct ChuckForm {
     pub declared: bool,
 }
 
+impl Lobes {
+    /// c of Re c·e^{i·order·angle}.
+    fn harmonic(&self, world: &World) -> Result<Complex64, Fault> {
+        check::order("order", self.order, 2, world.orders())?;
+        check::finite("amplitude_um", self.amplitude_um)?;
+        check::finite("phase_deg", self.phase_deg)?;
+        Ok(Complex64::from_polar(self.amplitude_um, -self.phase_deg.to_radians()))
+    }
+}
+
+/// A form that turns with the spindle and not with the part; its angle counts from the spindle.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(transparent)]
+pub struct ChuckForm(pub Lobes);
+
+/// The part has another form as it is clamped in a setup; its angle counts from the part.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(transparent)]
+pub struct ClampingForm(pub Lobes);
+
+/// A sensor sees a pattern of the part's material that is no form; its angle counts from the part.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(transparent)]
+pub struct ElectricalRunOut(pub Lobes);
+
 impl Acts for ChuckForm {
     fn declared(&self) -> bool {
-        self.declared
+        self.0.declared
     }
 
     fn apply(&self, world: &mut World, _index: usize) -> Result<(), Fault> {
-        let value = harmonic(world, self.order, self.amplitude_um, self.phase_deg)?;
-        series::add(&mut world.chuck_um, self.order, value);
+        if !self.0.targets.is_empty() {
+            return Err(Fault::at("targets", "a chuck's form is in all setups and sensors").help("leave it out"));
+        }
+        let value = self.0.harmonic(world)?;
+        series::add(&mut world.chuck_um, self.0.order, value);
         Ok(())
     }
 }
 
-/// The part has another form as it is clamped in a setup; its angle counts from the part.
-#[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct ClampingForm {
-    /// Ids of setups.
-    pub targets: Vec<String>,
-    /// Per turn, from 2.
-    pub order: usize,
-    /// In µm.
-    pub amplitude_um: f64,
-    /// Of amplitude · cos(order · angle − phase), in degrees.
-    #[serde(default)]
-    pub phase_deg: f64,
-    /// Always false: what the separation is to know is declared in the pipeline.
-    #[serde(default)]
-    pub declared: bool,
-}
-
 impl Acts for ClampingForm {
     fn declared(&self) -> bool {
-        self.declared
+        self.0.declared
     }
 
     fn apply(&self, world: &mut World, _index: usize) -> Result<(), Fault> {
-        let value = harmonic(world, self.order, self.amplitude_um, self.phase_deg)?;
-        on_setups(world, &self.targets, |setup| series::add(&mut setup.clamping_form_um, self.order, value))
+        let value = self.0.harmonic(world)?;
+        on_setups(world, &self.0.targets, |setup| series::add(&mut setup.clamping_form_um, self.0.order, value))
     }
-}
-
-/// A sensor sees a pattern of the part's material that is no form; its angle counts from the part.
-#[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct ElectricalRunOut {
-    /// Ids of sensors.
-    pub targets: Vec<String>,
-    /// Per turn, from 2.
-    pub order: usize,
-    /// In µm.
-    pub amplitude_um: f64,
-    /// Of amplitude · cos(order · angle − phase), in degrees.
-    #[serde(default)]
-    pub phase_deg: f64,
-    /// Always false: what the separation is to know is declared in the pipeline.
-    #[serde(default)]
-    pub declared: bool,
 }
 
 impl Acts for ElectricalRunOut {
     fn declared(&self) -> bool {
-        self.declared
+        self.0.declared
     }
 
     fn apply(&self, world: &mut World, _index: usize) -> Result<(), Fault> {
-        let value = harmonic(world, self.order, self.amplitude_um, self.phase_deg)?;
-        on_sensors(world, &self.targets, |sensor| series::add(&mut sensor.run_out_um, self.order, value))
+        let value = self.0.harmonic(world)?;
+        on_sensors(world, &self.0.targets, |sensor| series::add(&mut sensor.run_out_um, self.0.order, value))
     }
-}
-
-/// c of Re c·e^{i·order·α}.
-fn harmonic(world: &World, order: usize, amplitude_um: f64, phase_deg: f64) -> Result<Complex64, Fault> {
-    check::order("order", order, 2, world.orders())?;
-    check::finite("amplitude_um", amplitude_um)?;
-    check::finite("phase_deg", phase_deg)?;
-    Ok(Complex64::from_polar(amplitude_um, -phase_deg.to_radians()))
 }

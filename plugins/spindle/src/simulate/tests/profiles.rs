@@ -54,14 +54,13 @@ fn patterns_turn_with_what_they_are_fixed_to() {
     let scene = scene();
     let both = |config: &SpindleConfig| [INITIAL, TURNED].map(|setup| readings(config, 0, setup));
     let (order, amplitude_um, phase_deg, declared) = (4, 0.6, 25.0, false);
-    let clamping =
-        ClampingForm { targets: vec![scene.rig.setups[TURNED].id.clone()], order, amplitude_um, phase_deg, declared };
-    let run_out = ElectricalRunOut { targets: ids(&["S2"]), order, amplitude_um, phase_deg, declared };
+    let lobes = |targets| Lobes { targets, order, amplitude_um, phase_deg, declared };
+    let setup = vec![scene.rig.setups[TURNED].id.clone()];
     let before = both(&scene);
     let cases: [Case; 3] = [
-        (Effect::ChuckForm(ChuckForm { order, amplitude_um, phase_deg, declared }), 0.0, |_, _| true),
-        (Effect::ClampingForm(clamping), 1.0, |setup, _| setup == TURNED),
-        (Effect::ElectricalRunOut(run_out), 1.0, |_, channel| channel == 1),
+        (Effect::ChuckForm(ChuckForm(lobes(vec![]))), 0.0, |_, _| true),
+        (Effect::ClampingForm(ClampingForm(lobes(setup))), 1.0, |setup, _| setup == TURNED),
+        (Effect::ElectricalRunOut(ElectricalRunOut(lobes(ids(&["S2"])))), 1.0, |_, channel| channel == 1),
     ];
     for (effect, on_part, has) in cases {
         let after = both(&beside(&scene, effect));
