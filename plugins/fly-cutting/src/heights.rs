@@ -2,12 +2,7 @@
 
 use std::ops::Range;
 
-use runout_core::{
-    Error, Result,
-    height_grid::GridPlaces,
-    numerics::{height_map::HeightMap, least_squares::dot},
-    points::Points,
-};
+use runout_core::{Error, Result, height_grid::GridPlaces, numerics::least_squares::dot, points::Points};
 
 use crate::config::FlyCuttingConfig;
 

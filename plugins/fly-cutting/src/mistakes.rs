@@ -66,7 +66,7 @@ mod tests {
     fn map(effects: &str) -> Points {
         let text = format!("noise_nm = 2.0\n[cut]\n{CUT}{GRID}{effects}");
         let scenario: FlyCuttingScenario = toml::from_str(&text).unwrap();
-        scenario.heights().unwrap().points("map.h5".into())
+        Points::of_grid(scenario.heights().unwrap(), "map.h5".into())
     }
 
     fn said(points: &Points) -> Option<String> {
