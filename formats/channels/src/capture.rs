@@ -13,6 +13,7 @@ use crate::{
     channel::{Channel, ChannelFile},
     config::{ChannelConfig, ChannelsConfig},
     files::Files,
+    hints::is_time,
     select, unit,
 };
 
@@ -22,22 +23,6 @@ const SAME_RATE: f64 = 1e-3;
 const SAME_INSTANT: f64 = 0.01;
 /// Samples that are read at a time.
 pub(crate) const BLOCK: usize = 1 << 13;
-/// Names of channels that hold the times of the samples.
-const TIMES: [&str; 12] = [
-    "time",
-    "time_s",
-    "t",
-    "t_s",
-    "times",
-    "timestamp",
-    "timestamps",
-    "zeit",
-    "x_value",
-    "x-axis",
-    "elapsed",
-    "elapsed_s",
-];
-
 /// A file and one of its channels.
 #[derive(Clone)]
 pub(crate) struct Signal {
@@ -320,14 +305,6 @@ fn time_beside(beside: &Signal) -> Option<Signal> {
         .position(|channel| is_time(channel) && channel.group == own.group && channel.samples == own.samples)?;
     let shown = beside.shown.replace(&own.path(), &channels[index].path());
     Some(Signal { file: Arc::clone(&beside.file), index, shown })
-}
-
-/// Whether a channel is named like one of times.
-pub(crate) fn is_time(channel: &Channel) -> bool {
-    let is_named = TIMES.contains(&channel.name.to_lowercase().as_str());
-    let is_seconds =
-        channel.unit.as_deref().and_then(unit::known).is_none_or(|unit| matches!(unit, unit::Known::Seconds(_)));
-    channel.kind.is_number() && is_named && is_seconds
 }
 
 /// When the first samples were taken, which has to be at one time.

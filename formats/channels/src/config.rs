@@ -6,19 +6,16 @@ use std::{
 };
 
 use runout_core::{
-    Error, ErrorKind, Result,
     fault::{Fault, known_names},
     marker::Edge,
     measurement::StationKey,
-    pipeline::{Context, StageConfig},
     rig::Rig,
-    stage::{Loader, Request, Source, SourceKind},
 };
 use runout_csv::StationConfig;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::{formats::FORMATS, recording::ChannelRecording, unit};
+use crate::{formats::FORMATS, unit};
 
 /// No converter of displacement sensors is as fast: a higher number is a mistake.
 const HIGHEST_RATE_HZ: f64 = 1e9;
@@ -136,26 +133,16 @@ pub struct AngleConfig {
     pub unit: Option<String>,
 }
 
-impl StageConfig for ChannelsConfig {
-    type Stage = Box<dyn Loader>;
-    const NAME: &'static str = "channels";
-    const ABOUT: &'static str =
-        "named channels of other programs: TDMS, MAT, HDF5, text, LVM, NumPy, Parquet, Arrow, UFF, WAV";
-
-    fn check(mut self, context: &Context) -> std::result::Result<Self::Stage, Fault> {
-        self.check_files(context.rig)?;
-        self.check_numbers()?;
-        self.check_channels(context.rig)?;
-        self.check_turns(context.rig)?;
-        let stations = self.check_stations()?;
-        if let Some(path) = &mut self.path {
-            *path = context.path(path);
-        }
-        Ok(Box::new(ChannelLoader { config: self, folder: context.folder.to_owned(), stations }))
-    }
-}
-
 impl ChannelsConfig {
+    /// Checks all values, and gives the stations.
+    pub(crate) fn checked(&self, rig: Option<&Rig>) -> std::result::Result<Vec<StationKey>, Fault> {
+        self.check_files(rig)?;
+        self.check_numbers()?;
+        self.check_channels(rig)?;
+        self.check_turns(rig)?;
+        self.check_stations()
+    }
+
     fn check_files(&self, rig: Option<&Rig>) -> std::result::Result<(), Fault> {
         match (&self.path, &self.pattern) {
             (None, None) => {
@@ -300,25 +287,4 @@ impl ChannelsConfig {
 /// Whether a unit is one of sensors' numbers.
 fn is_reading(text: &str) -> bool {
     matches!(unit::known(text), Some(unit::Known::LengthUm(_) | unit::Known::Volts(_)))
-}
-
-struct ChannelLoader {
-    config: ChannelsConfig,
-    folder: PathBuf,
-    stations: Vec<StationKey>,
-}
-
-impl Loader for ChannelLoader {
-    fn kind(&self) -> SourceKind {
-        SourceKind::Turns
-    }
-
-    fn open(&self, wanted: &Request) -> Result<Source> {
-        let rig = wanted.rig.ok_or_else(|| {
-            Error::new("open", "the channels", "recorded turns need a [rig] that names the sensors")
-                .of(ErrorKind::Configuration)
-        })?;
-        let recording = ChannelRecording::open(rig, self.config.clone(), &self.folder, self.stations.clone())?;
-        Ok(Source::Turns(Box::new(recording)))
-    }
 }

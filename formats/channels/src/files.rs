@@ -1,4 +1,4 @@
-//! The files of a recording, and their signals read side by side.
+//! The files of a recording.
 
 use std::{
     path::{Path, PathBuf},
@@ -7,11 +7,7 @@ use std::{
 
 use runout_core::{Result, input_file::InputFile};
 
-use crate::{
-    capture::{Conversion, Signal},
-    channel::{ChannelFile, Samples},
-    formats,
-};
+use crate::{channel::ChannelFile, formats};
 
 /// The files that were opened.
 pub(crate) struct Files {
@@ -57,55 +53,5 @@ impl Files {
 
     pub(crate) fn inputs(&self) -> Vec<InputFile> {
         self.inputs.lock().unwrap_or_else(PoisonError::into_inner).clone()
-    }
-}
-
-/// Reads the signals of one capture side by side.
-pub(crate) struct Readers {
-    parts: Vec<Part>,
-}
-
-/// What is read of one file.
-struct Part {
-    samples: Box<dyn Samples>,
-    /// Which of the signals.
-    signals: Vec<usize>,
-    columns: Vec<Vec<f64>>,
-}
-
-impl Readers {
-    pub(crate) fn open(signals: &[(Signal, Conversion)]) -> Result<Self> {
-        let mut parts: Vec<(&Signal, Vec<usize>)> = Vec::new();
-        for (number, (signal, _)) in signals.iter().enumerate() {
-            match parts.iter_mut().find(|(other, _)| Arc::ptr_eq(&other.file, &signal.file)) {
-                Some((_, numbers)) => numbers.push(number),
-                None => parts.push((signal, vec![number])),
-            }
-        }
-        let open = |(signal, numbers): (&Signal, Vec<usize>)| {
-            let channels: Vec<usize> = numbers.iter().map(|number| signals[*number].0.index).collect();
-            let samples = signal.file.read(&channels)?;
-            Ok(Part { samples, columns: vec![Vec::new(); numbers.len()], signals: numbers })
-        };
-        Ok(Self { parts: parts.into_iter().map(open).collect::<Result<_>>()? })
-    }
-
-    /// Hands on up to `most` samples of each signal: its number and they.
-    pub(crate) fn next(&mut self, most: usize, mut take: impl FnMut(usize, &[f64])) -> Result<()> {
-        for Part { samples, signals, columns } in &mut self.parts {
-            columns.iter_mut().for_each(Vec::clear);
-            // A reader may give fewer at a time.
-            let mut left = most;
-            while left > 0 {
-                match samples.next(left, columns)? {
-                    0 => break,
-                    taken => left = left.saturating_sub(taken),
-                }
-            }
-            for (signal, column) in signals.iter().zip(&*columns) {
-                take(*signal, column);
-            }
-        }
-        Ok(())
     }
 }

@@ -2,7 +2,10 @@
 
 use runout_core::Result;
 
-use crate::channel::{Channel, ChannelFile, Kind, Samples};
+use crate::{
+    channel::{Channel, ChannelFile, Kind, Samples},
+    unit,
+};
 
 /// Names of variables that hold a sampling rate in Hz.
 const RATES: [&str; 11] = [
@@ -23,6 +26,21 @@ const STEPS: [&str; 8] =
     ["dt", "dt_s", "delta_t", "tinterval", "interval", "sample_interval", "sampling_interval", "wf_increment"];
 /// Names of variables that hold a unit.
 const UNITS: [&str; 3] = ["unit", "units", "einheit"];
+/// Names of channels that hold the times of the samples.
+const TIMES: [&str; 12] = [
+    "time",
+    "time_s",
+    "t",
+    "t_s",
+    "times",
+    "timestamp",
+    "timestamps",
+    "zeit",
+    "x_value",
+    "x-axis",
+    "elapsed",
+    "elapsed_s",
+];
 /// Under which property the text of a variable is.
 pub(crate) const TEXT: &str = "text";
 
@@ -61,6 +79,14 @@ pub(crate) fn is_rate(name: &str) -> bool {
 /// Whether a name in lower case is that of the time from sample to sample in s.
 pub(crate) fn is_step(name: &str) -> bool {
     STEPS.contains(&name)
+}
+
+/// Whether a channel is named like one of times.
+pub(crate) fn is_time(channel: &Channel) -> bool {
+    let is_named = TIMES.contains(&channel.name.to_lowercase().as_str());
+    let is_seconds =
+        channel.unit.as_deref().and_then(unit::known).is_none_or(|unit| matches!(unit, unit::Known::Seconds(_)));
+    channel.kind.is_number() && is_named && is_seconds
 }
 
 struct Hint {

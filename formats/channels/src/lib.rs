@@ -19,6 +19,7 @@ mod files;
 mod formats;
 mod hints;
 mod lines;
+mod loader;
 mod recording;
 mod select;
 mod source;

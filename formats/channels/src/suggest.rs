@@ -6,9 +6,10 @@ use runout_core::{Result, input_file::InputFile};
 use serde::Serialize;
 
 use crate::{
-    capture::{BLOCK, is_time},
+    capture::BLOCK,
     channel::{Channel, ChannelFile, Samples},
     formats,
+    hints::is_time,
     unit::{self, Known},
 };
 

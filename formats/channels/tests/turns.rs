@@ -130,7 +130,7 @@ fn pulses(a_turn: f64, height: f64) -> impl Fn(f64) -> f64 {
         let phase = (a_turn * turns_at(time_s)).rem_euclid(1.0);
         let slope = RATE_HZ / (a_turn * (TURNS_A_S + GAINED_A_S * time_s)) / 4.0;
         let nearest = if phase > 0.5 { phase - 1.0 } else { phase };
-        height * (0.5 + nearest * slope).clamp(0.0, 1.0) * f64::from(u8::from(phase < 0.4 || phase > 0.75))
+        height * (0.5 + nearest * slope).clamp(0.0, 1.0) * f64::from(u8::from(!(0.4..=0.75).contains(&phase)))
     }
 }
 

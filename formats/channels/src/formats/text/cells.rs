@@ -11,6 +11,12 @@ pub(super) struct Dialect {
     pub(super) decimal: u8,
 }
 
+/// Blank lines and comments between rows.
+pub(super) fn is_passed_over(line: &[u8]) -> bool {
+    let line = line.trim_ascii();
+    line.is_empty() || line.starts_with(b"#")
+}
+
 /// The cells of a line, without blanks and quotes around them, and without empty ones at the end where `trimmed`.
 pub(super) fn cells(line: &[u8], delimiter: u8) -> Vec<&[u8]> {
     let line = line.strip_prefix(&[0xEF, 0xBB, 0xBF]).unwrap_or(line);

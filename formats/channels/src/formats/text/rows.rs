@@ -4,7 +4,7 @@ use runout_core::{Error, ErrorKind, Result};
 
 use super::{
     LONGEST_LINE,
-    cells::{Dialect, cells, instant_s, number},
+    cells::{Dialect, cells, instant_s, is_passed_over, number},
     table::Table,
 };
 use crate::{bytes::Bytes, source::Source};
@@ -64,10 +64,4 @@ impl RowSamples {
         }
         Ok(taken)
     }
-}
-
-/// Blank lines and comments between rows.
-pub(super) fn is_passed_over(line: &[u8]) -> bool {
-    let line = line.trim_ascii();
-    line.is_empty() || line.starts_with(b"#")
 }

@@ -4,14 +4,12 @@ use runout_core::{Error, ErrorKind, Result, clock::ClockScan};
 
 use super::{
     LONGEST_LINE,
-    cells::{Dialect, cells, instant_s, number, without_end},
-    rows::is_passed_over,
+    cells::{Dialect, cells, instant_s, is_passed_over, number, without_end},
 };
 use crate::{
     bytes::{Bytes, text},
-    capture::is_time,
     channel::{Channel, Kind},
-    hints::{is_rate, is_step},
+    hints::{is_rate, is_step, is_time},
     unit::{self, Known},
 };
 
