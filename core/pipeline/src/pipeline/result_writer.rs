@@ -19,10 +19,7 @@ use crate::{
 use runout_closed_loop::diagnosis::{self, Correction, Diagnosis};
 use runout_consistency::Check;
 use runout_error::{Error, Result};
-use runout_evaluate::{
-    Evaluate, Evaluated, EvaluatedStation, Group, add_areal, add_generatrices, decide, height_grid::HeightGrid,
-    part_summary,
-};
+use runout_evaluate::{self as values, Evaluate, Evaluated, EvaluatedStation, Group, height_grid::HeightGrid};
 use runout_table::{TableRows, TableSpec};
 use runout_turning::{
     measurement::StationKey,
@@ -179,7 +176,7 @@ impl ResultWriter {
         let Some(builder) = self.sections.take() else { return Ok(None) };
         let evaluate = &self.evaluate;
         if evaluate.has(Group::Cylindricity) || evaluate.needs_surface() {
-            self.summary.part = part_summary(builder.sections(), self.angles, evaluate, radius_mm, self.placed);
+            self.summary.part = values::part_summary(builder.sections(), self.angles, evaluate, radius_mm, self.placed);
         }
         match self.surface {
             SurfaceUse::Unused => return Ok(None),
@@ -189,8 +186,8 @@ impl ResultWriter {
         let (surface, uncertain) = builder.build(radius_mm)?;
         if evaluate.needs_surface() {
             let part = self.summary.part.get_or_insert_with(PartSummary::default);
-            add_generatrices(part, &uncertain, radius_mm, self.placed, evaluate);
-            add_areal(part, &surface, &uncertain, if self.placed { 0 } else { 2 }, evaluate)?;
+            values::add_generatrices(part, &uncertain, radius_mm, self.placed, evaluate);
+            values::add_areal(part, &surface, &uncertain, if self.placed { 0 } else { 2 }, evaluate)?;
         }
         self.summary.surface = Some(SurfaceSummary {
             angles: surface.angles,
@@ -260,7 +257,7 @@ impl ResultWriter {
         self.summary.refute_part();
         let mut placed = self.summary.placed_values();
         placed.extend(self.evaluated.placed());
-        let (limits, unmatched) = decide(self.evaluate.limits(), &placed);
+        let (limits, unmatched) = values::decide(self.evaluate.limits(), &placed);
         self.summary.limits = limits;
         self.gather_warnings(remarks.into_iter().chain(unmatched));
         let values = if self.of_form {
