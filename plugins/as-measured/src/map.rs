@@ -14,8 +14,7 @@ use crate::{
 };
 
 /// Why a map has no ±.
-const NO_NOISE: &str = "a map that was measured once does not show its noise: what differs from point to point may be texture. Repeated maps of one place \
-    (ISO 25178-600) would tell them apart";
+const NO_NOISE: &str = "a map that was measured once does not show its noise";
 
 /// The table of the surface.
 pub(crate) fn table() -> TableSpec {
@@ -55,14 +54,14 @@ pub(crate) fn outcome(points: &Points, config: &AsMeasuredConfig) -> Result<Outc
     if staged.filled > 0 && staged.by_filling.is_none() {
         remarks.push("the filled voids are too many to say how uncertain values are by them".into());
     }
-    let no_uncertainty = staged.sq_by_filling_nm.map_or_else(
-        || NO_NOISE.to_owned(),
-        |std_nm| format!("{NO_NOISE}. The filled points alone make Sq uncertain by {std_nm:.3} nm (table `filling`)"),
-    );
+    if let Some(std_nm) = staged.sq_by_filling_nm {
+        remarks.push(format!("the filled points alone make Sq uncertain by {std_nm:.3} nm (table `filling`)"));
+    }
     let mut tables = vec![surface(&staged.grid)?, rows(&staged.stages)?];
     tables.extend(staged.by_filling);
     let mut map = PlaneMap::new("surface", staged.grid);
-    (map.reference, map.filled, map.no_uncertainty) = (Some(staged.reference), staged.filled, Some(no_uncertainty));
+    (map.reference, map.filled, map.no_uncertainty) =
+        (Some(staged.reference), staged.filled, Some(NO_NOISE.to_owned()));
     Ok(Outcome {
         convention: "heights in nm, out of the material positive; x along the rows, y from row to row".into(),
         tables,

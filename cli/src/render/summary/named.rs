@@ -62,12 +62,20 @@ pub(super) fn section(page: &mut Page, values: &[NamedValue]) {
             }
         }
     }
+    let others = || values.iter().filter(|value| !shared(value));
+    // What all values are referred to and filtered by is said once.
+    let standard: Vec<&NamedValue> = others().filter(|value| value.reference.is_some()).collect();
+    let alike =
+        |one: &NamedValue, other: &NamedValue| (&one.reference, &one.filter) == (&other.reference, &other.filter);
+    let common = standard.first().filter(|first| standard.len() > 1 && standard.iter().all(|one| alike(one, first)));
     let mut table = Table::new(2, ["value", "of", "number ± std", "unit", "what it is"]);
-    for value in values.iter().filter(|value| !shared(value)) {
+    for value in others() {
         let of = value.of.clone().unwrap_or_default();
-        table.row([name(value), of, number(value), unit(&value.unit), value.about.clone()]);
+        let name = if common.is_some() { value.symbol.clone() } else { name(value) };
+        table.row([name, of, number(value), unit(&value.unit), value.about.clone()]);
     }
-    page.headed_table("Values of the whole", &table);
+    let about = common.map_or_else(String::new, |first| format!(": {}", basis(first)));
+    page.headed_table(format_args!("Values of the whole{about}"), &table);
 }
 
 /// "STRt LSLI, unfiltered µm"; of a domain's own values symbol and unit.
@@ -84,6 +92,12 @@ fn name(value: &NamedValue) -> String {
         (Some(reference), Some(filter)) => described(&value.symbol, reference, filter, "").trim_end().to_owned(),
         _ => value.symbol.clone(),
     }
+}
+
+/// "LSLI, unfiltered": what a standard's value was referred to, and its filter.
+fn basis(value: &NamedValue) -> String {
+    let name = name(value);
+    name.strip_prefix(&value.symbol).unwrap_or_default().trim_start_matches([',', ' ']).to_owned()
 }
 
 fn number(value: &NamedValue) -> String {
