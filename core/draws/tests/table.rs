@@ -234,18 +234,32 @@ fn intervals_hold_the_truth_of_unlike_forms() {
     }
 }
 
+/// Trials of 40 in which the truth is outside, of each value where noise is stated too large.
+fn outside_where_stated_too_large(form: usize, std_um: f64, times: f64) -> Vec<(&'static str, usize)> {
+    let (name, form) = FORMS[form];
+    let cells = cells(form, false, std_um, Known::Stated(times), 40);
+    let outside: Vec<_> = NAMES.into_iter().zip(cells.iter().map(|cell| cell.below + cell.above)).collect();
+    println!("{name}, {std_um} µm stated {times} times too large, outside of 40: {outside:?}");
+    outside
+}
+
 /// A variance that the data refute as too large does not make an interval too narrow.
 #[test]
 fn intervals_hold_the_truth_where_noise_is_stated_too_large() {
-    const TRIALS: u64 = 40;
     for (form, std_um, times) in
         [(0, 0.1, 100.0), (2, 0.01, 30.0), (2, 0.003, 1000.0), (3, 0.1, 10.0), (14, 0.1, 10.0), (16, 0.05, 30.0)]
     {
-        let (name, form) = FORMS[form];
-        for (value, cell) in NAMES.iter().zip(cells(form, false, std_um, Known::Stated(times), TRIALS)) {
-            let wrong = cell.below + cell.above;
-            assert!(wrong <= 7, "{name}, {std_um} µm stated {times} times, {value}: {cell:?} of {TRIALS}");
+        for (value, outside) in outside_where_stated_too_large(form, std_um, times) {
+            assert!(outside <= 7, "form {form}, {std_um} µm stated {times} times too large, {value}: {outside} of 40");
         }
+    }
+}
+
+#[test]
+#[ignore = "does not hold: a form above its overstated noise does not refute it, though its slopes lie in that noise"]
+fn intervals_hold_the_truth_of_a_form_above_its_overstated_noise() {
+    for (value, outside) in outside_where_stated_too_large(0, 0.1, 30.0) {
+        assert!(outside <= 7, "{value}: {outside} of 40");
     }
 }
 

@@ -103,10 +103,6 @@ pub(super) struct Form {
     draws: OnceCell<Option<Draws>>,
 }
 
-/// Points on a wave where errors are drawn: there a value's error is sought, not the value.
-const DRAWN_POINTS_A_WAVE: usize = 6;
-/// Angles at which a profile is looked at are a multiple of this, for the sake of the transform.
-const WHOLE: usize = 256;
 /// What a low-pass has taken of the profile is left out where it is below this share of the errors' standard deviation.
 const NEGLIGIBLE: f64 = 1e-3;
 
@@ -222,8 +218,7 @@ impl Form {
         let value = largest(&changes);
         let found = self.draws().and_then(|draws| {
             let weight = |order: usize| filter.weight(order) * change(order);
-            let angles = (DRAWN_POINTS_A_WAVE * waves).next_multiple_of(WHOLE);
-            let profiles = draws.profiles(weight, angles, |_, changes| gaps.blank(changes));
+            let profiles = draws.profiles(weight, self.drawn_angles(filter), |_, changes| gaps.blank(changes));
             profiles.values_of_section(|changes, found| found.push(largest(changes))).pop()
         });
         let source = "largest change of the profile over a window, no standard's symbol";

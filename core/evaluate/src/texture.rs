@@ -109,7 +109,7 @@ impl Form {
     }
 
     /// Angles on which errors are drawn.
-    fn drawn_angles(&self, filter: &Filter) -> usize {
+    pub(super) fn drawn_angles(&self, filter: &Filter) -> usize {
         (DRAWN_POINTS_A_WAVE * filter.highest(self.held.highest)).next_multiple_of(WHOLE).max(WHOLE)
     }
 }

@@ -36,15 +36,24 @@ pub(crate) fn is_one(start: &[u8]) -> bool {
 type Archive = ZipArchive<BufReader<File>>;
 
 /// Whether an archive is an X3P: other formats are archives, too.
+///
+/// # Errors
+/// When it is cut or damaged.
 pub(crate) fn is_in(input: &Input) -> Result<bool> {
+    Ok(member(&opened(input)?, "main.xml").is_some())
+}
+
+fn opened(input: &Input) -> Result<Archive> {
     let archive = ZipArchive::new(BufReader::new(input.open()?));
-    Ok(archive.is_ok_and(|archive| member(&archive, "main.xml").is_some()))
+    archive.map_err(|error| {
+        failed(&input.shown, error).help("the archive is cut or damaged: copy the file again from where it was written")
+    })
 }
 
 /// Reads a file.
 pub(crate) fn read(input: &Input, wanted: &Wanted) -> Result<Map> {
     let shown = &input.shown;
-    let mut archive = ZipArchive::new(BufReader::new(input.open()?)).map_err(|error| failed(shown, error))?;
+    let mut archive = opened(input)?;
     let main =
         member(&archive, "main.xml").ok_or_else(|| damaged(shown, "the archive has no main.xml: it is no X3P"))?;
     let folder = main.trim_end_matches("main.xml").to_owned();
