@@ -38,10 +38,8 @@ impl<M: Model> Tracing<'_, M> {
         let mut settings = current.settings.clone();
         settings.push(Setting { effect, values: start.cloned().unwrap_or(vec![0.0; parameters]) });
         let trial = refit(self.model, settings, self.settings.known.len()).ok()?;
-        let last = trial.settings.last();
-        let is_possible = last.is_none_or(|last| self.model.is_possible(effect, &last.values));
         let evidence = evidence(trial.chi2);
-        is_possible.then(|| (effect, trial.remainder_only(), evidence))
+        (!trial.ends_at_bound).then(|| (effect, trial.remainder_only(), evidence))
     }
 
     /// Candidates with what each lowers χ² by, to first order or from where its fit starts, the most first.

@@ -26,8 +26,7 @@ impl<M: Model> Tracing<'_, M> {
         for choice in choices {
             // A combination that cannot be fitted does not explain the data.
             let Ok(refit) = self.refit_chosen(model, &start, &choice) else { continue };
-            let free = &refit.settings[self.settings.known.len()..];
-            if free.iter().any(|setting| !model.is_possible(setting.effect, &setting.values)) {
+            if refit.ends_at_bound {
                 continue;
             }
             let mut other = (choice, refit);

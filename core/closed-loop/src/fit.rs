@@ -25,13 +25,15 @@ pub struct Refit<F> {
     /// Covariance of the free parameters, `[parameter][parameter]`, for noise of size 1 in the residual, with what is
     /// [open within bounds](Fit::open_within_bounds).
     pub covariance: Vec<Vec<f64>>,
+    /// Whether χ² is lower still at [values that are not possible](Model::is_possible).
+    pub ends_at_bound: bool,
 }
 
 impl<F: Fit> Refit<F> {
     /// The same with what the fit leaves in place of the fit.
     pub(super) fn remainder_only(self) -> Refit<Remainder> {
-        let Self { settings, fit, chi2, covariance } = self;
-        Refit { settings, fit: fit.remainder().clone(), chi2, covariance }
+        let Self { settings, fit, chi2, covariance, ends_at_bound } = self;
+        Refit { settings, fit: fit.remainder().clone(), chi2, covariance, ends_at_bound }
     }
 }
 
@@ -43,16 +45,20 @@ pub fn refit<M: Model>(model: &M, start: Vec<Setting>, fixed: usize) -> Result<R
     let mut settings = start;
     let mut fit = model.fit(&settings)?;
     let mut chi2 = fit.remainder().chi2();
+    let mut ends_at_bound = false;
     for _ in 0..MAX_STEPS {
         let step = system(&fit, &settings[fixed..]).coefficients(&fit.remainder().residual);
         let mut share = 1.0;
         let mut better = None;
+        ends_at_bound = false;
         for _ in 0..MAX_HALVINGS {
             let mut trial = settings.clone();
             let values = trial[fixed..].iter_mut().flat_map(|setting| &mut setting.values);
             values.zip(&step).for_each(|(value, step)| *value -= share * step);
+            let is_possible = trial[fixed..].iter().all(|setting| model.is_possible(setting.effect, &setting.values));
+            ends_at_bound |= !is_possible;
             // A trial beyond all bounds is as bad as a worse one.
-            if let Ok(found) = model.fit(&trial) {
+            if is_possible && let Ok(found) = model.fit(&trial) {
                 let found_chi2 = found.remainder().chi2();
                 if found_chi2 < chi2 {
                     better = Some((trial, found, found_chi2));
@@ -74,7 +80,7 @@ pub fn refit<M: Model>(model: &M, start: Vec<Setting>, fixed: usize) -> Result<R
     for open in fit.open_within_bounds() {
         widen(&mut covariance, &system, &open);
     }
-    Ok(Refit { settings, fit, chi2, covariance })
+    Ok(Refit { settings, fit, chi2, covariance, ends_at_bound })
 }
 
 /// The linearised system J δ ≈ −r.

@@ -183,7 +183,7 @@ impl Model for SpindleModel {
     }
 
     fn is_possible(&self, effect: usize, values: &[f64]) -> bool {
-        self.traced.kind(effect).is_possible(values)
+        self.traced.kind(effect).is_possible(values, &self.traced.layout)
     }
 
     fn size(&self, effect: usize, values: &[f64]) -> f64 {

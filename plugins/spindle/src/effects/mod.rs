@@ -96,7 +96,7 @@ pub trait SpindleEffect: Send + Sync {
     }
 
     /// Whether its parameters can have these values.
-    fn is_possible(&self, _values: &[f64]) -> bool {
+    fn is_possible(&self, _values: &[f64], _layout: &Layout) -> bool {
         true
     }
 
