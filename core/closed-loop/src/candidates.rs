@@ -6,7 +6,7 @@ use super::{
     Fit, Model, Remainder, Setting,
     closed_loop::Tracing,
     evidence::Evidence,
-    fit::{Refit, refit},
+    fit::{Refit, first_step, refit},
     judgement::independent,
 };
 use runout_numerics::least_squares::dot;
@@ -37,6 +37,14 @@ impl<M: Model> Tracing<'_, M> {
         }
         let mut settings = current.settings.clone();
         settings.push(Setting { effect, values: start.cloned().unwrap_or(vec![0.0; parameters]) });
+        // Where even the first step leads to what an effect cannot be, so does the rest; many fits of absurd values take long.
+        if start.is_none() {
+            let step = first_step(&current.fit, &settings[self.settings.known.len()..]);
+            let values: Vec<f64> = step[step.len() - parameters..].iter().map(|step| -step).collect();
+            if !self.model.is_possible(effect, &values) {
+                return None;
+            }
+        }
         let trial = refit(self.model, settings, self.settings.known.len()).ok()?;
         let evidence = evidence(trial.chi2);
         (!trial.ends_at_bound).then(|| (effect, trial.remainder_only(), evidence))

@@ -15,6 +15,7 @@ use super::{
         too_little, unit,
     },
     keyed::Keyed,
+    mistakes::Declaration,
     report::{added, blind, level, moved, verdict},
 };
 use runout_consistency::{Check, Test};
@@ -72,12 +73,15 @@ pub fn diagnose<M: Model>(model: &M, settings: &Settings) -> Result<Closed<M::Fi
     let declared = model.fit(&settings.known)?.remainder().clone();
     let mut tracing = Tracing { model, settings, found: Vec::new(), refused: Vec::new() };
     let mut current = tracing.refit_found(model, &[])?;
-    if let Some(corrected) = tracing.find_mistakes(&current)? {
-        current = corrected;
+    let mut first = None;
+    match tracing.find_mistakes(&current)? {
+        Declaration::Sound => {}
+        Declaration::Beside(effect) => first = Some(*effect),
+        Declaration::Corrected(corrected) => current = corrected,
     }
     let most = tracing.found.len() + settings.max_added;
     while tracing.found.len() < most {
-        let Some(found) = tracing.next(&current) else { break };
+        let Some(found) = first.take().or_else(|| tracing.next(&current)) else { break };
         tracing.found.push(found);
         current = tracing.refit_found(model, &current.settings)?;
         if let Some(start) = tracing.split_common(&current) {

@@ -47,7 +47,7 @@ pub fn refit<M: Model>(model: &M, start: Vec<Setting>, fixed: usize) -> Result<R
     let mut chi2 = fit.remainder().chi2();
     let mut ends_at_bound = false;
     for _ in 0..MAX_STEPS {
-        let step = system(&fit, &settings[fixed..]).coefficients(&fit.remainder().residual);
+        let step = first_step(&fit, &settings[fixed..]);
         let mut share = 1.0;
         let mut better = None;
         ends_at_bound = false;
@@ -81,6 +81,11 @@ pub fn refit<M: Model>(model: &M, start: Vec<Setting>, fixed: usize) -> Result<R
         widen(&mut covariance, &system, &open);
     }
     Ok(Refit { settings, fit, chi2, covariance, ends_at_bound })
+}
+
+/// What is to be taken off the parameters of free effects, to first order, `[parameter]`.
+pub(super) fn first_step(fit: &impl Fit, free: &[Setting]) -> Vec<f64> {
+    system(fit, free).coefficients(&fit.remainder().residual)
 }
 
 /// The linearised system J δ ≈ −r.

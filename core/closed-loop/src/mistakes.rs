@@ -22,12 +22,22 @@ const NEAR_NOISE: f64 = 4.0;
 /// Corrections whose χ² differ by less than this, in units of what is left, cannot be distinguished.
 const SAME_CHI2: f64 = 10.0;
 
+/// What the search for mistakes finds.
+pub(super) enum Declaration<F> {
+    /// Nothing that the data prove.
+    Sound,
+    /// Less than this effect explains, which therefore comes first.
+    Beside(Box<Found>),
+    /// Mistakes; the fit with them corrected.
+    Corrected(Refit<F>),
+}
+
 impl<M: Model> Tracing<'_, M> {
-    /// Corrects the mistakes that the data prove, before anything else is looked for. Gives the fit with them corrected.
-    pub(super) fn find_mistakes(&mut self, current: &Refit<M::Fit>) -> Result<Option<Refit<M::Fit>>> {
+    /// Corrects the mistakes that the data prove, before anything else is looked for.
+    pub(super) fn find_mistakes(&mut self, current: &Refit<M::Fit>) -> Result<Declaration<M::Fit>> {
         let before = current.fit.remainder();
         if before.noise_is_known() && before.chi2_per_dof() < SUSPICIOUS_CHI2 {
-            return Ok(None);
+            return Ok(Declaration::Sound);
         }
         let suspected = self.model.suspected_mistakes(&current.settings);
         let wanted = |mistakes: &Vec<usize>| mistakes.iter().all(|mistake| self.may_be_added(*mistake));
@@ -42,13 +52,23 @@ impl<M: Model> Tracing<'_, M> {
         // Of corrections that leave the same, that of fewer mistakes.
         let size =
             |(mistakes, left): &(Vec<usize>, Remainder)| left.chi2_per_dof() * (1.0 + 1e-3 * mistakes.len() as f64);
-        let Some((mistakes, after)) = tried.iter().min_by(|a, b| size(a).total_cmp(&size(b))) else { return Ok(None) };
+        let Some((mistakes, after)) = tried.iter().min_by(|a, b| size(a).total_cmp(&size(b))) else {
+            return Ok(Declaration::Sound);
+        };
         let share = if before.noise_is_known() { LEFT } else { LEFT_OF_UNKNOWN };
         if after.chi2_per_dof() > share * before.chi2_per_dof() || worse(before.held_out_chi2, after.held_out_chi2) {
-            return Ok(None);
+            return Ok(Declaration::Sound);
         }
-        if !self.beats_an_effect(current, after) {
-            return Ok(None);
+        // One effect may look like two mistakes: they lead to the noise, or at least farther than any single effect.
+        if !after.noise_is_known() || after.chi2_per_dof() >= NEAR_NOISE {
+            // What is refused beside a wrong declaration says nothing.
+            let refused = self.refused.clone();
+            let effect = self.next(current);
+            let goes_farther = |effect: &Found| effect.after.chi2_per_dof() <= after.chi2_per_dof();
+            if let Some(effect) = effect.filter(goes_farther) {
+                return Ok(Declaration::Beside(Box::new(effect)));
+            }
+            self.refused = refused;
         }
         let unit = if after.noise_is_known() { after.chi2_per_dof().max(1.0) } else { after.chi2_per_dof() };
         let alike = |left: &Remainder| left.chi2() - after.chi2() < SAME_CHI2 * unit;
@@ -82,20 +102,7 @@ impl<M: Model> Tracing<'_, M> {
                 after: after.clone(),
             });
         }
-        self.refit_found(self.model, &[]).map(Some)
-    }
-
-    /// Whether corrections that leave this lead to the noise, or at least farther than any single effect: one effect may look like
-    /// two mistakes.
-    fn beats_an_effect(&mut self, current: &Refit<M::Fit>, after: &Remainder) -> bool {
-        if after.noise_is_known() && after.chi2_per_dof() < NEAR_NOISE {
-            return true;
-        }
-        // What is refused beside a wrong declaration says nothing.
-        let refused = self.refused.clone();
-        let effect = self.next(current);
-        self.refused = refused;
-        effect.is_none_or(|effect| effect.after.chi2_per_dof() > after.chi2_per_dof())
+        self.refit_found(self.model, &[]).map(Declaration::Corrected)
     }
 
     /// Whether the user lets the loop add it.

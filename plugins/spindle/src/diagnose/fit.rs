@@ -50,6 +50,10 @@ impl SpindleFit {
         let layout = shared.layout.altered(&alterations);
         let stations: Vec<Solved> =
             shared.data.iter().map(|data| Solved::new(&shared, data, &layout, &alterations)).collect();
+        // The declared model's fit is what it is; values at which no solution settles are not those of an effect.
+        if !applied.is_empty() && stations.iter().any(|solved| solved.estimate.is_unsettled()) {
+            return Err(Error::new("apply", "effects", "no solution settles at their values").of(ErrorKind::Numerical));
+        }
         let remainder = remainder(&shared, &stations, &layout, &alterations);
         Ok(Self { shared, alterations, layout, stations, remainder, others: Vec::new(), weights: vec![1.0] })
     }

@@ -2,6 +2,9 @@
 
 use runout_core::Complex64;
 
+/// No result is given of a solution that still moves more than this, rms.
+const UNSETTLED_UM: f64 = 5e-4;
+
 /// The unknowns at all orders, motion at the sensors' mean z.
 #[derive(Debug, Clone)]
 pub(crate) struct Estimate {
@@ -18,6 +21,16 @@ pub(crate) struct Estimate {
 }
 
 impl Estimate {
+    /// Whether exact geometry does not settle, or gives no number.
+    pub(crate) fn is_unsettled(&self) -> bool {
+        self.moves_more_than(UNSETTLED_UM)
+    }
+
+    /// Whether the last pass has moved the readings by more, or gives no number.
+    pub(super) fn moves_more_than(&self, limit_um: f64) -> bool {
+        self.moved_um.is_nan() || self.moved_um > limit_um
+    }
+
     /// An unknown at an order, 0 where it is not observable.
     #[must_use]
     pub(crate) fn observable_value(&self, order: usize, unknown: usize) -> Complex64 {

@@ -38,10 +38,10 @@ const SETTLED_UM: f64 = 1e-9;
 const APART_UM: f64 = 1e-6;
 /// Passes of all orders together, at most.
 const JOINT_PASSES: usize = 30;
+/// They end where so many in a row move the readings no less than one before.
+const PASSES_IN_VAIN: usize = 3;
 /// Form or motion of an order above so many times its readings is not what they show.
 const CANCELLING: f64 = 30.0;
-/// No result is given of a solution that still moves more than this, rms.
-const UNSETTLED_UM: f64 = 5e-4;
 
 /// Solves one station.
 pub(crate) struct Solver<'a> {
@@ -68,7 +68,7 @@ impl Solver<'_> {
         let operators = method(&readings);
         let (estimate, linear) = self.iterate(&readings, &operators, |_, _| {});
         let beyond = self.eccentricity_um(&readings) > far_off::FAR_OFF * 1e3 * self.selection.rig.part_radius_mm;
-        if self.second_order && beyond || self.couples(&readings) && is_above(estimate.moved_um, UNSETTLED_UM) {
+        if self.second_order && beyond || self.couples(&readings) && estimate.is_unsettled() {
             return Err(self.unsettled(station, &readings, &estimate));
         }
         let mut propagation = Propagation::of(&readings, &operators);
@@ -165,7 +165,7 @@ impl Solver<'_> {
             }
         }
         match geometry {
-            Some(geometry) if coupled && is_above(estimate.moved_um, APART_UM) => {
+            Some(geometry) if coupled && estimate.moves_more_than(APART_UM) => {
                 self.together(readings, operators, geometry, beyond)
             }
             _ => (estimate, linear),
@@ -193,6 +193,8 @@ impl Solver<'_> {
         let mut linear = own.clone();
         let mut estimate = self.estimate(operators, &own, readings.max_order);
         let mut excess = vec![Complex64::ZERO; own.len()];
+        let mut least_um = f64::INFINITY;
+        let mut in_vain = 0;
         for _ in 0..JOINT_PASSES {
             geometry.excess(&estimate, &mut excess);
             let mut joint = Joint::new(self.layout, operators, readings.samples_per_rev, geometry.met_rad());
@@ -212,7 +214,9 @@ impl Solver<'_> {
             estimate = self.estimate(operators, &own, readings.max_order);
             let moved = change.iter().map(Complex64::norm_sqr).sum::<f64>();
             estimate.moved_um = (0.5 * moved / count as f64).sqrt();
-            if estimate.moved_um < APART_UM {
+            in_vain = if estimate.moved_um < least_um { 0 } else { in_vain + 1 };
+            least_um = least_um.min(estimate.moved_um);
+            if estimate.moved_um < APART_UM || in_vain == PASSES_IN_VAIN {
                 break;
             }
         }
@@ -366,9 +370,4 @@ impl Solver<'_> {
         let width = self.layout.unknowns.len();
         (0..width).flat_map(|unknown| columns.iter().map(move |column| column[unknown])).collect()
     }
-}
-
-/// Whether a value is above a limit, or no number.
-fn is_above(value: f64, limit: f64) -> bool {
-    value.is_nan() || value > limit
 }
