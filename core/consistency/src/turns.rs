@@ -25,6 +25,9 @@ pub const MOST_ROWS: usize = 512;
 /// Rows from which anything is said.
 const FEWEST_ROWS: usize = 8;
 
+/// The tests that a phase of all orders fails.
+const OF_PHASE: [&str; 2] = [common::PHASE, marks::AGAINST_THE_MARK];
+
 /// Low orders of the turns of one recording, one row a turn or a mean of neighbouring turns.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct TurnTable {
@@ -51,8 +54,41 @@ pub struct Course {
     pub phase_std_rad: f64,
     /// Standard deviation of a size that all orders share, relative. 0 where none changes.
     pub size_std: f64,
+    /// The phase that all orders share, where it is a step or a run.
+    pub phase: Option<PhaseCourse>,
     /// Orders that change by themselves, with the covariance of their course over the turns, in µm², `[channel][channel]`.
     pub orders: Vec<(usize, Vec<Complex64>)>,
+}
+
+/// A phase that all orders share, over the turns: that of order n is n times as much.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PhaseCourse {
+    /// The step, in rad, or the run, in rad a turn.
+    pub by_rad: f64,
+    /// Its standard uncertainty, from the scatter over the orders.
+    pub std_rad: f64,
+    /// Share of the turns that are before the step; `None` for a run.
+    pub step_at: Option<f64>,
+}
+
+impl PhaseCourse {
+    /// The phase at each row of a table, in rad, from that of the first turn.
+    fn at(&self, table: &TurnTable) -> Vec<f64> {
+        let rows = table.rows();
+        let first = self.step_at.map(|share| (share * rows as f64).round() as usize);
+        let turn = |row: usize| (row * table.together.max(1)) as f64;
+        let at = |row| match first {
+            Some(first) => {
+                if row < first {
+                    0.0
+                } else {
+                    self.by_rad
+                }
+            }
+            None => turn(row) * self.by_rad,
+        };
+        (0..rows).map(at).collect()
+    }
 }
 
 impl Course {
@@ -83,6 +119,14 @@ impl Course {
         };
         let orders = self.orders.iter().map(|(order, matrix)| (*order, select(matrix))).collect();
         Self { orders, ..self.clone() }
+    }
+
+    /// The same where the phase that all orders share is taken out.
+    #[must_use]
+    pub fn without_phase(&self) -> Self {
+        let mut steady = Self { phase_std_rad: 0.0, phase: None, ..self.clone() };
+        steady.checks.retain(|check| !OF_PHASE.contains(&check.of.as_str()));
+        steady
     }
 
     /// Whether anything changes.
@@ -121,6 +165,19 @@ impl TurnTable {
     /// The same coefficient in every row.
     fn series(&self, order: usize, channel: usize) -> impl Iterator<Item = Complex64> + Clone + '_ {
         (0..self.rows()).map(move |row| self.at(row, order, channel))
+    }
+
+    /// With the phase of order 1 in each row taken out of it, and n times as much of order n.
+    fn turned_back(&self, phase_rad: &[f64]) -> Self {
+        let mut turned = self.clone();
+        let of_row = turned.coefficients.chunks_exact_mut((self.orders * self.channels).max(1));
+        for (row, phase_rad) in of_row.zip(phase_rad) {
+            for (index, orders) in row.chunks_exact_mut(self.channels).enumerate() {
+                let back = Complex64::cis(-phase_rad * (index + 1) as f64);
+                orders.iter_mut().for_each(|value| *value *= back);
+            }
+        }
+        turned
     }
 
     /// Without what a level that creeps leaves in each turn: a saw-tooth of −i·rise/πn at order n.

@@ -2,7 +2,7 @@
 
 use runout_numerics::{Complex64, fourier::Fourier, statistics::f_tail};
 
-use super::{Course, TurnTable, mean};
+use super::{Course, PhaseCourse, TurnTable, mean};
 use crate::check::{Check, Test};
 
 /// An order counts where its mean is this many standard errors.
@@ -17,6 +17,11 @@ const LOOKS: f64 = 20.0;
 const ALIKE_STEPS: f64 = 4.0;
 /// Share of a weight that is no leverage, at least.
 const LEAST_LEFT: f64 = 0.3;
+
+/// Rounds in which a phase is taken out and what is left of it is looked for: each leaves the cube of what the one before left.
+const ROUNDS: usize = 4;
+/// The test of the phase.
+pub(super) const PHASE: &str = "phase of all orders";
 
 /// A course that orders share.
 #[derive(Debug, Clone, Copy)]
@@ -36,7 +41,7 @@ pub(super) fn look(table: &TurnTable, course: &mut Course) {
     let found = Parts::of(table).map(|parts| parts.and_then(|part| part.shared(table.rows())));
     for (is_phase, shared) in [true, false].into_iter().zip(found) {
         let Some(shared) = shared else { continue };
-        let name = if is_phase { "phase of all orders" } else { "size of all orders" };
+        let name = if is_phase { PHASE } else { "size of all orders" };
         let p = (LOOKS * shared.p).min(1.0);
         let check = Check::new(Test::Turns, name, shared.t, &[], p).finding(|| words(table, is_phase, shared));
         // What turns against the mark is said already.
@@ -51,9 +56,28 @@ pub(super) fn look(table: &TurnTable, course: &mut Course) {
             );
             let std = if is_phase { &mut course.phase_std_rad } else { &mut course.size_std };
             *std = shared.by.abs() * share;
+            if is_phase {
+                let step_at = shared.step.map(|row| row as f64 / rows);
+                let by_rad = if step_at.is_some() { shared.by } else { shared.by / table.together.max(1) as f64 };
+                course.phase = Some(PhaseCourse { by_rad, std_rad: f64::NAN, step_at });
+            }
         }
         course.checks.push(check);
     }
+    course.phase = course.phase.and_then(|phase| settled(phase, table));
+}
+
+/// The phase that leaves nothing of its shape when it is taken out of all orders; `None` where too few orders show it.
+fn settled(mut phase: PhaseCourse, table: &TurnTable) -> Option<PhaseCourse> {
+    let shape = PhaseCourse { by_rad: 1.0, ..phase }.at(table);
+    let middle = shape.iter().sum::<f64>() / shape.len() as f64;
+    let shape: Vec<f64> = shape.into_iter().map(|value| value - middle).collect();
+    for _ in 0..ROUNDS {
+        let [parts, _] = Parts::of(&table.turned_back(&phase.at(table)));
+        let (left_rad, std_rad, _) = parts?.over_orders(&shape)?;
+        (phase.by_rad, phase.std_rad) = (phase.by_rad + left_rad, std_rad);
+    }
+    Some(phase)
 }
 
 fn words(table: &TurnTable, is_phase: bool, shared: Shared) -> String {
@@ -143,13 +167,13 @@ impl Parts {
         let steps = (rows as f64 / ALIKE_STEPS).max(1.0);
         let candidates = [(run, None, 1.0), (step(best.1), Some(best.1), steps)];
         let tested = candidates.into_iter().filter_map(|(shape, step, count)| {
-            let (by, t, over_orders) = self.over_orders(&shape)?;
-            Some(Shared { by, step, t, p: over_orders.max(over_turns(&series, &shape) * count) })
+            let (by, std, over_orders) = self.over_orders(&shape)?;
+            Some(Shared { by, step, t: by / std, p: over_orders.max(over_turns(&series, &shape) * count) })
         });
         tested.min_by(|a, b| a.p.total_cmp(&b.p))
     }
 
-    /// Size of a shape in the mean over orders, its t by their scatter, and the chance of that. No order decides alone: three at least
+    /// Size of a shape in the mean over orders, its standard uncertainty by their scatter, and the chance of that. No order decides alone: three at least
     /// share the weight.
     fn over_orders(&self, shape: &[f64]) -> Option<(f64, f64, f64)> {
         let square: f64 = shape.iter().map(|value| value * value).sum();
@@ -174,8 +198,9 @@ impl Parts {
             squares += leverage * leverage;
         }
         let freedom = (1.0 / squares - 1.0).max(1.0);
-        let t = size / variance.sqrt().max(f64::MIN_POSITIVE);
-        Some((size, t, f_tail(t * t, 1.0, freedom)))
+        let std = variance.sqrt().max(f64::MIN_POSITIVE);
+        let t = size / std;
+        Some((size, std, f_tail(t * t, 1.0, freedom)))
     }
 }
 

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use runout_numerics::Complex64;
 
-use super::{Course, TurnTable, common::turning, mean, spectrum::Spectrum};
+use super::{Course, PhaseCourse, TurnTable, common::turning, mean, spectrum::Spectrum};
 use crate::check::{Check, FINDING, Test};
 
 /// Coherence of order 1 below which a steady turning is looked for: where it takes away four fifths of what lacks, and where half.
@@ -26,12 +26,16 @@ const AT_ORDERS: usize = 3;
 /// Power of what alternates beside all that is synchronous.
 const SHARE: f64 = 0.01;
 
+/// The test of order 1.
+pub(super) const AGAINST_THE_MARK: &str = "order 1 against the mark";
+
 pub(super) fn look(table: &TurnTable, spectrum: &Spectrum, course: &mut Course) {
     let found = [several_a_turn(table, spectrum), once_in_several(table), turns_against_the_mark(table)];
     for found in found {
         course.checks.push(found.check);
         if found.phase_std_rad > 0.0 {
             course.phase_std_rad = found.phase_std_rad;
+            course.phase = found.phase;
         }
         if found.is_open {
             course.orders = (1..=table.orders).map(|order| (order, scatter(table, order))).collect();
@@ -45,6 +49,7 @@ pub(super) fn look(table: &TurnTable, spectrum: &Spectrum, course: &mut Course) 
 struct Found {
     check: Check,
     phase_std_rad: f64,
+    phase: Option<PhaseCourse>,
     /// The mean is nothing that the part has.
     is_open: bool,
 }
@@ -54,7 +59,7 @@ impl Found {
         let p = if words.is_some() { 0.1 * FINDING } else { 1.0 };
         let is_open = words.is_some();
         let check = Check::new(Test::Turns, of, statistic, &[], p).finding(|| words.unwrap_or_default());
-        Self { check, phase_std_rad: 0.0, is_open }
+        Self { check, phase_std_rad: 0.0, phase: None, is_open }
     }
 }
 
@@ -92,9 +97,11 @@ fn turns_against_the_mark(table: &TurnTable) -> Found {
     let is_turning = is_turning && !(2..=table.orders).any(|order| 1.0 - steady(table, order) < 0.5 * (1.0 - before));
     let by_turn = by_rad / table.together.max(1) as f64;
     let words = is_turning.then(|| turning(by_turn, "order 1 turns"));
-    let mut found = Found::new("order 1 against the mark", before, words);
+    let mut found = Found::new(AGAINST_THE_MARK, before, words);
     if is_turning {
         found.phase_std_rad = by_rad.abs() * ((rows * rows - 1) as f64 / 12.0).sqrt();
+        // How well it is known, all orders show.
+        found.phase = Some(PhaseCourse { by_rad: by_turn, std_rad: f64::NAN, step_at: None });
     }
     found
 }

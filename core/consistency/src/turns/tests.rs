@@ -216,3 +216,27 @@ fn a_creeping_level_is_taken_out() {
     assert!(first(&steady) < 0.3 * first(&table), "{} {}", first(&steady), first(&table));
     assert!(findings(&table).is_empty(), "{:?}", findings(&table));
 }
+
+/// A phase of all orders is found with its size, small or so large that orders turn by many periods.
+#[test]
+fn a_phase_is_as_large_as_it_is_said_to_be() {
+    let mut random = Random::new(11);
+    for (trouble, by_rad) in [
+        (Trouble::Step(0.5_f64.to_radians()), 0.5_f64.to_radians()),
+        (Trouble::Step(20_f64.to_radians()), 20_f64.to_radians()),
+        (Trouble::Ratio(1.0005), -TAU * 0.0005),
+        (Trouble::Ratio(1.021), -TAU * 0.021),
+        (Trouble::Ratio(0.97), TAU * 0.03),
+    ] {
+        let (mut held, mut said) = (0, 0);
+        for trial in 0..40 {
+            let recording = Recording { turns: 60, channels: 4, ..Recording::any(&mut random, 6 * trial) };
+            let Some(phase) = recording.record(&mut random, trouble).course().phase else { continue };
+            said += 1;
+            held += usize::from((phase.by_rad - by_rad).abs() < 3.0 * phase.std_rad);
+            assert!((phase.by_rad / by_rad - 1.0).abs() < 0.2, "{trouble:?}: {phase:?}");
+        }
+        println!("simulated, {trouble:?}: said {said} of 40, within 3 std {held}");
+        assert!(said >= 20 && held * 100 >= 85 * said, "{trouble:?}: {held} of {said}");
+    }
+}
