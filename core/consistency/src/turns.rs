@@ -65,29 +65,23 @@ pub struct Course {
 pub struct PhaseCourse {
     /// The step, in rad, or the run, in rad a turn.
     pub by_rad: f64,
-    /// Its standard uncertainty, from the scatter over the orders.
+    /// Its standard uncertainty, from the scatter over the orders or that over the turns, whichever is larger.
     pub std_rad: f64,
-    /// Share of the turns that are before the step; `None` for a run.
-    pub step_at: Option<f64>,
+    /// Turns before the step, and the standard uncertainty of their number; `None` for a run.
+    pub step_at: Option<[f64; 2]>,
 }
 
 impl PhaseCourse {
     /// The phase at each row of a table, in rad, from that of the first turn.
     fn at(&self, table: &TurnTable) -> Vec<f64> {
-        let rows = table.rows();
-        let first = self.step_at.map(|share| (share * rows as f64).round() as usize);
-        let turn = |row: usize| (row * table.together.max(1)) as f64;
-        let at = |row| match first {
-            Some(first) => {
-                if row < first {
-                    0.0
-                } else {
-                    self.by_rad
-                }
-            }
-            None => turn(row) * self.by_rad,
+        let together = table.together.max(1) as f64;
+        // The row in which it steps is before it in part.
+        let behind = |row: usize, first: f64| (row as f64 + 1.0 - first).clamp(0.0, 1.0);
+        let share = |row: usize| match self.step_at {
+            Some([turns, _]) => behind(row, turns / together),
+            None => row as f64 * together,
         };
-        (0..rows).map(at).collect()
+        (0..table.rows()).map(|row| self.by_rad * share(row)).collect()
     }
 }
 

@@ -1,6 +1,10 @@
 //! What all orders share: a phase over n, or a relative size, that runs or steps.
 
-use runout_numerics::{Complex64, fourier::Fourier, statistics::f_tail};
+use runout_numerics::{
+    Complex64,
+    fourier::Fourier,
+    statistics::{f_tail, student_95},
+};
 
 use super::{Course, PhaseCourse, TurnTable, mean};
 use crate::check::{Check, Test};
@@ -15,11 +19,13 @@ const END_ROWS: usize = 3;
 const LOOKS: f64 = 20.0;
 /// Steps at neighbouring turns are one step.
 const ALIKE_STEPS: f64 = 4.0;
+/// Least standard uncertainty of where a phase steps, in rows.
+const WITHIN_A_TURN: f64 = 0.5;
 /// Share of a weight that is no leverage, at least.
 const LEAST_LEFT: f64 = 0.3;
 
 /// Rounds in which a phase is taken out and what is left of it is looked for: each leaves the cube of what the one before left.
-const ROUNDS: usize = 4;
+const ROUNDS: usize = 6;
 /// The test of the phase.
 pub(super) const PHASE: &str = "phase of all orders";
 
@@ -57,8 +63,9 @@ pub(super) fn look(table: &TurnTable, course: &mut Course) {
             let std = if is_phase { &mut course.phase_std_rad } else { &mut course.size_std };
             *std = shared.by.abs() * share;
             if is_phase {
-                let step_at = shared.step.map(|row| row as f64 / rows);
-                let by_rad = if step_at.is_some() { shared.by } else { shared.by / table.together.max(1) as f64 };
+                let together = table.together.max(1) as f64;
+                let step_at = shared.step.map(|row| [row as f64 * together, f64::NAN]);
+                let by_rad = if step_at.is_some() { shared.by } else { shared.by / together };
                 course.phase = Some(PhaseCourse { by_rad, std_rad: f64::NAN, step_at });
             }
         }
@@ -69,13 +76,23 @@ pub(super) fn look(table: &TurnTable, course: &mut Course) {
 
 /// The phase that leaves nothing of its shape when it is taken out of all orders; `None` where too few orders show it.
 fn settled(mut phase: PhaseCourse, table: &TurnTable) -> Option<PhaseCourse> {
-    let shape = PhaseCourse { by_rad: 1.0, ..phase }.at(table);
-    let middle = shape.iter().sum::<f64>() / shape.len() as f64;
-    let shape: Vec<f64> = shape.into_iter().map(|value| value - middle).collect();
+    let (rows, together) = (table.rows() as f64, table.together.max(1) as f64);
     for _ in 0..ROUNDS {
+        let shape = PhaseCourse { by_rad: 1.0, ..phase }.at(table);
+        let middle = shape.iter().sum::<f64>() / rows;
+        let shape: Vec<f64> = shape.into_iter().map(|value| value - middle).collect();
         let [parts, _] = Parts::of(&table.turned_back(&phase.at(table)));
-        let (left_rad, std_rad, _) = parts?.over_orders(&shape)?;
-        (phase.by_rad, phase.std_rad) = (phase.by_rad + left_rad, std_rad);
+        let parts = parts?;
+        let (left_rad, std_rad, freedom) = parts.over_orders(&shape)?;
+        let of_orders_rad = std_rad * student_95(freedom) / student_95(f64::INFINITY);
+        let (of_turns_rad, _) = over_turns(&parts.common(), &shape);
+        (phase.by_rad, phase.std_rad) = (phase.by_rad + left_rad, of_orders_rad.max(of_turns_rad));
+        // Where it steps, rows show as well as they scatter beside it, and to a part of a turn at best.
+        if let Some([_, std]) = &mut phase.step_at {
+            let common = parts.common();
+            let scatter = common.iter().map(|value| value * value).sum::<f64>() / rows;
+            *std = together * (scatter / (phase.by_rad * phase.by_rad)).max(WITHIN_A_TURN);
+        }
     }
     Some(phase)
 }
@@ -140,17 +157,23 @@ impl Parts {
         })
     }
 
+    /// What the cells have in common, by their weights, about its mean, `[row]`.
+    fn common(&self) -> Vec<f64> {
+        let whole: f64 = self.cells.iter().map(|(_, weight)| weight).sum();
+        let mut series = vec![0.0; self.values.first().map_or(0, Vec::len)];
+        for (values, (_, weight)) in self.values.iter().zip(&self.cells) {
+            series.iter_mut().zip(values).for_each(|(sum, value)| *sum += weight / whole * value);
+        }
+        let level = series.iter().sum::<f64>() / series.len().max(1) as f64;
+        series.iter_mut().for_each(|value| *value -= level);
+        series
+    }
+
     /// The run, or the step at the best turn, whichever is less likely chance.
     fn shared(&self, rows: usize) -> Option<Shared> {
         let middle = 0.5 * (rows as f64 - 1.0);
         let run: Vec<f64> = (0..rows).map(|row| row as f64 - middle).collect();
-        let whole: f64 = self.cells.iter().map(|(_, weight)| weight).sum();
-        let mut series = vec![0.0; rows];
-        for (values, (_, weight)) in self.values.iter().zip(&self.cells) {
-            series.iter_mut().zip(values).for_each(|(sum, value)| *sum += weight / whole * value);
-        }
-        let level = series.iter().sum::<f64>() / rows as f64;
-        series.iter_mut().for_each(|value| *value -= level);
+        let series = self.common();
         let step = |first: usize| -> Vec<f64> {
             let share = first as f64 / rows as f64;
             (0..rows).map(|row| if row < first { share - 1.0 } else { share }).collect()
@@ -167,13 +190,15 @@ impl Parts {
         let steps = (rows as f64 / ALIKE_STEPS).max(1.0);
         let candidates = [(run, None, 1.0), (step(best.1), Some(best.1), steps)];
         let tested = candidates.into_iter().filter_map(|(shape, step, count)| {
-            let (by, std, over_orders) = self.over_orders(&shape)?;
-            Some(Shared { by, step, t: by / std, p: over_orders.max(over_turns(&series, &shape) * count) })
+            let (by, std, freedom) = self.over_orders(&shape)?;
+            let t = by / std;
+            let over_orders = f_tail(t * t, 1.0, freedom);
+            Some(Shared { by, step, t, p: over_orders.max(over_turns(&series, &shape).1 * count) })
         });
         tested.min_by(|a, b| a.p.total_cmp(&b.p))
     }
 
-    /// Size of a shape in the mean over orders, its standard uncertainty by their scatter, and the chance of that. No order decides alone: three at least
+    /// Size of a shape in the mean over orders, its standard uncertainty by their scatter, and the degrees of freedom of that. No order decides alone: three at least
     /// share the weight.
     fn over_orders(&self, shape: &[f64]) -> Option<(f64, f64, f64)> {
         let square: f64 = shape.iter().map(|value| value * value).sum();
@@ -199,14 +224,13 @@ impl Parts {
         }
         let freedom = (1.0 / squares - 1.0).max(1.0);
         let std = variance.sqrt().max(f64::MIN_POSITIVE);
-        let t = size / std;
-        Some((size, std, f_tail(t * t, 1.0, freedom)))
+        Some((size, std, freedom))
     }
 }
 
-/// Chance that the common course has as much of a shape, from the scatter of its turns: at least that of the slow part of their
-/// spectrum.
-fn over_turns(series: &[f64], shape: &[f64]) -> f64 {
+/// Standard uncertainty of a shape's size in the common course, and the chance that it has as much of it, from the scatter of its turns: at
+/// least that of the slow part of their spectrum.
+fn over_turns(series: &[f64], shape: &[f64]) -> (f64, f64) {
     let rows = series.len();
     let norm = shape.iter().map(|value| value * value).sum::<f64>().sqrt();
     let size = series.iter().zip(shape).map(|(value, shape)| value * shape / norm).sum::<f64>();
@@ -222,5 +246,5 @@ fn over_turns(series: &[f64], shape: &[f64]) -> f64 {
     let all: f64 = left.iter().map(|value| value * value).sum::<f64>() / (rows as f64 - 2.0);
     let of_slow = (1..=slow.min(rows - 1)).map(power).sum::<f64>() / slow as f64;
     let (variance, freedom) = if of_slow > all { (of_slow, slow as f64) } else { (all, rows as f64 - 2.0) };
-    f_tail(size * size / variance.max(f64::MIN_POSITIVE), 1.0, freedom)
+    (variance.sqrt() / norm, f_tail(size * size / variance.max(f64::MIN_POSITIVE), 1.0, freedom))
 }

@@ -92,7 +92,7 @@ impl Recording {
                 let mut angle = TAU * time * speed;
                 let (mut fade, mut growth) = (0.0, 1.0);
                 match trouble {
-                    Trouble::Step(by) if turn >= self.turns / 3 => angle -= by,
+                    Trouble::Step(by) => angle -= if time < 0.31 * self.turns as f64 { 0.0 } else { by },
                     Trouble::Fade(by) => fade = by * (-time * 4.0 / self.turns as f64).exp(),
                     Trouble::Grows(by) => growth += by * time / self.turns as f64,
                     _ => {}

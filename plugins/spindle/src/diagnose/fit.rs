@@ -214,6 +214,12 @@ impl Fit for SpindleFit {
                     let creep = kind.creep_partials(place.index, *sensor).get(parameter).copied();
                     -creep.unwrap_or(0.0) / std
                 }));
+                column.extend(self.shared.data[index].phases.iter().flat_map(|(setup, phase)| {
+                    let partials = kind.phase_partials(place.index, *setup, phase);
+                    let [of_phase, of_place] = partials.get(parameter).copied().unwrap_or_default();
+                    let of_place = phase.step_at.map(|[_, std]| -of_place / std);
+                    std::iter::once(-of_phase / phase.std_rad).chain(of_place)
+                }));
                 column.extend(self.shared.data[index].seen.lines.iter().map(|_| 0.0));
             }
         }
@@ -297,7 +303,7 @@ impl Fit for SpindleFit {
                 let tested = if check.test == Test::Residual { with_beside(check, &beside) } else { check.clone() };
                 tested.among(self.stations.len())
             });
-            let turns = data.readings.courses.iter().zip(&rig.setups);
+            let turns = solved.corrected.courses.iter().zip(&rig.setups);
             let turns =
                 turns.flat_map(|(course, setup)| course.checks.iter().map(|check| check.clone().within(&setup.id)));
             let checks = residual.chain(turns);

@@ -58,12 +58,16 @@ impl Solved {
             }
         }
         let altered = data.altered(alterations, data.part);
+        for (course, setup) in corrected.courses.iter_mut().zip(&altered.setups) {
+            if setup.turning.run_rad != 0.0 || setup.turning.step_rad != 0.0 {
+                *course = course.without_phase();
+            }
+        }
         altered.correct(layout, &mut corrected);
         let max_order = corrected.max_order;
         // Displacements are weighed by the noise of the readings that they were.
         let slopes = alterations.slopes(layout, &corrected.mean);
-        let weights: Vec<_> =
-            (1..=max_order).map(|order| data.weights_of(order, layout, alterations, &slopes)).collect();
+        let weights: Vec<_> = (1..=max_order).map(|order| data.weights_of(order, layout, &altered, &slopes)).collect();
         let mut operators = Operators::least_squares(layout, max_order, Some(weights.clone()));
         if data.weights.is_none() {
             operators.weights = None;

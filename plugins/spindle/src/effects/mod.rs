@@ -28,12 +28,14 @@ mod sensors_angle;
 mod setup_motion_change;
 mod speed_ripple;
 mod thermal_drift;
+mod turning_phase;
 mod unlike_shares;
 
 use std::sync::Arc;
 
 use runout_core::{
     Complex64,
+    consistency::turns::PhaseCourse,
     effects::EffectEntry,
     model::{Parameter, diagnosis::Estimated, in_tolerances},
     rig::Rig,
@@ -44,6 +46,7 @@ pub use correct::creep;
 use mistakes::ordered_pairs;
 pub use mistakes::{Mistake, pair_of, pairs};
 pub use predicted::Predicted;
+pub use turning_phase::Turning;
 
 use crate::layout::Layout;
 use channel_response::ChannelResponse;
@@ -72,6 +75,17 @@ pub trait SpindleEffect: Send + Sync {
     /// ∂(mean creep of a sensor over one turn, in µm)/∂(parameter): the levels of the turns observe it besides the averaged turn.
     /// Nothing where the effect changes no level.
     fn creep_partials(&self, _target: usize, _sensor: usize) -> Vec<f64> {
+        Vec::new()
+    }
+
+    /// ∂(phase that all orders of a setup share, in rad)/∂(parameter), and ∂(turn at which it steps)/∂(parameter): single turns observe
+    /// them. Nothing where the effect is no such phase.
+    fn phase_partials(&self, _target: usize, _setup: usize, _phase: &PhaseCourse) -> Vec<[f64; 2]> {
+        Vec::new()
+    }
+
+    /// Its values where it is such a phase.
+    fn at_phase(&self, _phase: &PhaseCourse) -> Vec<f64> {
         Vec::new()
     }
 
@@ -129,7 +143,7 @@ pub trait SpindleEffect: Send + Sync {
     fn line(&self) -> Option<usize> {
         match self.turn_evidence()? {
             TurnEvidence::Line(number) => Some(number),
-            TurnEvidence::Levels => None,
+            TurnEvidence::Levels | TurnEvidence::Phase => None,
         }
     }
 
@@ -144,6 +158,8 @@ pub trait SpindleEffect: Send + Sync {
 pub enum TurnEvidence {
     /// The levels of the turns creep.
     Levels,
+    /// All orders share a phase that runs or steps.
+    Phase,
     /// The spectrum of the turns has a line: its number among those found.
     Line(usize),
 }
@@ -288,6 +304,8 @@ pub fn all() -> Vec<Arc<dyn SpindleEffect>> {
         Arc::new(sensors_angle::SensorsAngle),
         Arc::new(setup_motion_change::SetupMotionChange),
         Arc::new(thermal_drift::ThermalDrift),
+        Arc::new(turning_phase::TurningPhase::TurnRatio),
+        Arc::new(turning_phase::TurningPhase::LostSamples),
         Arc::new(even_order_motion::EvenOrderMotion),
         Arc::new(second_order_geometry::SecondOrderGeometry),
     ];

@@ -16,7 +16,7 @@ use super::{
     profile::Profile,
     random::{Place, Purpose, phase, stream},
     series::{self, LANES, Phasor, Series},
-    spin::Spin,
+    spin::{Marks, Spin},
     strangers::{Acting, Slip},
     world::{UM_PER_MM_URAD, World},
 };
@@ -81,8 +81,10 @@ struct SimulatedStream<'a> {
     spin: Spin,
     /// By how many samples sensors are late, and the asynchronous motion as they see it then; the first ones are not late.
     late: Vec<(f64, Wandering)>,
-    /// Angle of the spindle at its mark, in turns.
-    mark_turns: f64,
+    /// Angles of the spindle at its marks.
+    marks: Marks,
+    /// Turns after which samples are lost, and how many, in turns.
+    lost_turns: Option<(f64, f64)>,
     motion_ratio: f64,
     /// Whether the spindle turns the other way than in the other setups.
     backwards: bool,
@@ -196,7 +198,7 @@ impl<'a> SimulatedStream<'a> {
             sensors: (0..world.sensors.len()).collect(),
             sensor_ids: world.rig.sensors.iter().map(|sensor| sensor.id.clone()).collect(),
             converter_limits_um: limits,
-            marks: spin.marks(clamped_in.mark_turns),
+            marks: spin.marks(&clamped_in.marks),
             marks_within_samples: 0.0,
             encoder: world.phase == Phase::Encoder,
             trimmed: Vec::new(),
@@ -209,7 +211,8 @@ impl<'a> SimulatedStream<'a> {
             position: 0,
             spin,
             late: late.collect(),
-            mark_turns: clamped_in.mark_turns,
+            marks: clamped_in.marks,
+            lost_turns: clamped_in.lost_turns,
             motion_ratio: clamped_in.motion_ratio,
             backwards: clamped_in.backwards,
             sensors: sensors.collect(),
@@ -222,6 +225,9 @@ impl<'a> SimulatedStream<'a> {
         let mut turns = [(0.0, 0.0); LANES];
         for (lane, angle) in turns.iter_mut().enumerate() {
             *angle = self.spin.turns((start + lane.min(count - 1) as u64) as f64 - *delay_samples);
+            if let Some((_, lost)) = self.lost_turns.filter(|(after, _)| angle.0 + angle.1 >= *after) {
+                angle.1 += lost;
+            }
         }
         let forwards = Phasor::of_turns(&turns.map(|(_, rest)| rest));
         let turn = if self.backwards { forwards.conj() } else { forwards };
@@ -365,7 +371,7 @@ impl SampleStream for SimulatedStream<'_> {
             let instants: Vec<Instants> = (0..self.late.len()).map(|late| self.instants(late, start, count)).collect();
             if self.capture.encoder {
                 let turns = instants[0].turns[..count].iter();
-                block.angle_rev.extend(turns.map(|(whole, rest)| whole + rest - self.mark_turns));
+                block.angle_rev.extend(turns.map(|(whole, rest)| whole + rest - self.marks.late_turns(whole + rest)));
             }
             for (index, sensor) in self.sensors.iter_mut().enumerate() {
                 let seen = sensor.look(world, &instants[sensor.late], count);

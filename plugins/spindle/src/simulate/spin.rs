@@ -172,10 +172,10 @@ impl Spin {
         (whole, rest + self.deviation(path / samples_per_rev).0)
     }
 
-    /// Fractional sample positions of marks that come `mark_turns` behind whole turns, as many as lie within the capture.
-    pub(crate) fn marks(&self, mark_turns: f64) -> Vec<f64> {
+    /// Fractional sample positions of the marks, as many as lie within the capture.
+    pub(crate) fn marks(&self, of: &Marks) -> Vec<f64> {
         let last = (self.course.samples() - 1) as f64;
-        let marks = (0..=self.course.turns).map(|turn| self.mark(turn as f64 + mark_turns));
+        let marks = (0..=self.course.turns).map(|turn| self.mark(turn as f64 + of.late_turns(turn as f64)));
         // Rounding may put the closing mark a hair behind the last sample.
         marks.filter(|mark| (-HAIR..=last + HAIR).contains(mark)).map(|mark| mark.clamp(0.0, last)).collect()
     }
@@ -192,6 +192,22 @@ impl Spin {
             }
         }
         self.position(turns * self.course.samples_per_rev + self.course.margin)
+    }
+}
+
+/// Where the marks of a setup come.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Marks {
+    /// How far behind the spindle's whole turns the first comes, in turns.
+    pub offset_turns: f64,
+    /// By how much each is earlier than the one before it would have it, in turns.
+    pub run_turns: f64,
+}
+
+impl Marks {
+    /// How late a mark is after so many turns, in turns.
+    pub(crate) fn late_turns(&self, turns: f64) -> f64 {
+        self.offset_turns - self.run_turns * turns
     }
 }
 
@@ -215,7 +231,7 @@ mod tests {
     fn steady_turns_have_marks_on_whole_samples() {
         let spin = course(0, 0, 0.0).spin(1, 0, 0);
         let expected: Vec<f64> = (0..=20).map(|turn| f64::from(16 + 360 * turn)).collect();
-        assert_eq!(spin.marks(0.0), expected);
+        assert_eq!(spin.marks(&Marks::default()), expected);
         assert_eq!(spin.turns(106.0), (0.0, 0.25));
         assert_eq!(spin.turns(7.0), (-1.0, 351.0 / 360.0));
     }
@@ -227,7 +243,7 @@ mod tests {
         course.add_ripple(Ripple { order: 2.0, amplitude_turns: 0.002, phase_rad: 0.4 }, None).unwrap();
         course.add_ripple(Ripple { order: 0.37, amplitude_turns: 0.01, phase_rad: 2.0 }, None).unwrap();
         let spin = course.spin(5, 1, 3);
-        let marks = spin.marks(0.0);
+        let marks = spin.marks(&Marks::default());
         assert_eq!(marks.len(), 26);
         for (turn, mark) in marks.iter().enumerate() {
             let first = mark.floor() as u64 - 1;
@@ -249,7 +265,7 @@ mod tests {
     #[test]
     fn ramps_take_twice_the_time_of_their_turns() {
         let spin = course(3, 2, 0.0).spin(0, 0, 0);
-        let marks = spin.marks(0.0);
+        let marks = spin.marks(&Marks::default());
         assert_eq!(spin.course.samples(), 360 * (20 + 2 * 3 + 2 * 2) + 2 * 16 + 1);
         let lengths: Vec<f64> = marks.windows(2).map(|pair| pair[1] - pair[0]).collect();
         assert!(lengths[..3].windows(2).all(|pair| pair[0] > pair[1]), "the start-up speeds up: {lengths:?}");

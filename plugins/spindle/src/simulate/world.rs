@@ -18,7 +18,7 @@ use super::{
     motion::Motion,
     random::{Place, Purpose, phase, stream},
     series,
-    spin::Course,
+    spin::{Course, Marks},
     strangers::Stranger,
 };
 
@@ -98,8 +98,10 @@ pub(super) struct TrueSetup {
     pub channels: Vec<usize>,
     /// Whether the spindle turns the other way than in the other setups.
     pub backwards: bool,
-    /// Angle of the spindle at its mark, in turns.
-    pub mark_turns: f64,
+    /// Angles of the spindle at its marks.
+    pub marks: Marks,
+    /// Turns after which samples are lost, and how many, in turns.
+    pub lost_turns: Option<(f64, f64)>,
     /// One a section.
     pub clamping: Vec<Clamping>,
     /// By which angle the surface under a sensor on the axis is turned, as e^{iψ}.
@@ -187,7 +189,8 @@ impl World {
                 gain: 1.0,
                 channels: (0..rig.sensors.len()).collect(),
                 backwards: false,
-                mark_turns: 0.0,
+                marks: Marks::default(),
+                lost_turns: None,
                 clamping: vec![clamping; rig.sections.len()],
                 pole: phase(&mut stream(config.seed, Purpose::Pole, Place { setup: index, ..Place::default() })),
             }

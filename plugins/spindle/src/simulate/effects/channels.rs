@@ -157,6 +157,6 @@ impl Acts for IndexOffset {
 
     fn apply(&self, world: &mut World, _index: usize) -> Result<(), Fault> {
         check::finite("angle_deg", self.angle_deg)?;
-        on_setups(world, &self.targets, |setup| setup.mark_turns += self.angle_deg / 360.0)
+        on_setups(world, &self.targets, |setup| setup.marks.offset_turns += self.angle_deg / 360.0)
     }
 }

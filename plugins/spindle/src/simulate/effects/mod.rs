@@ -22,7 +22,7 @@ pub use profiles::{BracketMotion, ChuckForm, ClampingForm, ElectricalRunOut, Lob
 pub use sensors::{
     FilterAttenuation, SensorAngle, SensorAxialPosition, SensorGain, SensorLine, SensorNonlinearity, ThermalDrift,
 };
-pub use setups::{PartEccentricity, ReversalAngle, SensorsAngle, SetupMotionChange};
+pub use setups::{LostSamples, PartEccentricity, ReversalAngle, SensorsAngle, SetupMotionChange, TurnRatio};
 pub use spindle::{AsynchronousLine, AxialMotion, EvenOrderMotion, SecondOrderGeometry, SpeedRipple};
 pub use strangers::{Backlash, Dent, SlippedProbe, Step};
 
@@ -76,6 +76,10 @@ pub enum Effect {
     SetupGain(SetupGain),
     /// The mark of a setup comes at another angle of the spindle.
     IndexOffset(IndexOffset),
+    /// The mark of a setup is on a shaft that turns by another angle.
+    TurnRatio(TurnRatio),
+    /// Samples are lost at one turn of a setup's recording.
+    LostSamples(LostSamples),
     /// A sensor averages the form over an arc.
     ProbeSpot(ProbeSpot),
     /// A sensor's bracket moves by a share of the spindle's motion.
@@ -161,6 +165,8 @@ impl Effect {
             Self::ChannelGhost(effect) => effect,
             Self::SetupGain(effect) => effect,
             Self::IndexOffset(effect) => effect,
+            Self::TurnRatio(effect) => effect,
+            Self::LostSamples(effect) => effect,
             Self::ProbeSpot(effect) => effect,
             Self::BracketMotion(effect) => effect,
             Self::ChuckForm(effect) => effect,

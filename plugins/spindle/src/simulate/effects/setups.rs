@@ -61,6 +61,57 @@ impl Acts for SensorsAngle {
     }
 }
 
+/// The mark is on a shaft that turns by another angle: the part turns against it by the same angle every turn.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TurnRatio {
+    /// Ids of setups.
+    pub targets: Vec<String>,
+    /// By how much each turn is behind the one before, in degrees.
+    pub turning_deg: f64,
+    /// Always false: what the separation is to know is declared in the pipeline.
+    #[serde(default)]
+    pub declared: bool,
+}
+
+impl Acts for TurnRatio {
+    fn declared(&self) -> bool {
+        self.declared
+    }
+
+    fn apply(&self, world: &mut World, _index: usize) -> Result<(), Fault> {
+        check::finite("turning_deg", self.turning_deg)?;
+        on_setups(world, &self.targets, |setup| setup.marks.run_turns += self.turning_deg / 360.0)
+    }
+}
+
+/// Samples are lost at one turn of a recording whose marks are of another clock: from there on, all readings are those of later angles.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LostSamples {
+    /// Ids of setups.
+    pub targets: Vec<String>,
+    /// Turns since the first mark after which they are.
+    pub after_turns: f64,
+    /// How many, in degrees.
+    pub angle_deg: f64,
+    /// Always false: what the separation is to know is declared in the pipeline.
+    #[serde(default)]
+    pub declared: bool,
+}
+
+impl Acts for LostSamples {
+    fn declared(&self) -> bool {
+        self.declared
+    }
+
+    fn apply(&self, world: &mut World, _index: usize) -> Result<(), Fault> {
+        check::finite("angle_deg", self.angle_deg)?;
+        check::positive("after_turns", self.after_turns)?;
+        on_setups(world, &self.targets, |setup| setup.lost_turns = Some((self.after_turns, self.angle_deg / 360.0)))
+    }
+}
+
 /// Synchronous motion × ratio.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]

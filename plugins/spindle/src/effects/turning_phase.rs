@@ -1,0 +1,189 @@
+//! `turn-ratio`, `lost-samples`: all channels of a setup turn against its mark, steadily or since samples are lost. Single turns show by how much;
+//! the average of the turns has H(n) of order n,
+//!
+//! | effect | H(n) |
+//! | --- | --- |
+//! | `turn-ratio`, δ a turn | mean of e^{inδt} over the turns t that are averaged, counted from the first mark |
+//! | `lost-samples`, δ from a turn on | 1 − q + q·e^{−inδ}, q the share of the turns behind it |
+//!
+//! and ∂/∂δ = (H′/H)·u. The angle before the step, and at the first mark, is the declared one.
+
+use runout_core::{Complex64, consistency::turns::PhaseCourse};
+
+use super::{About, ActsOn, Alterations, Predicted, RAD_PER_DEG, SpindleEffect, TurnEvidence, parameter};
+
+/// How a setup turns against its mark.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum TurningPhase {
+    /// By the same angle every turn.
+    TurnRatio,
+    /// By one angle at one turn.
+    LostSamples,
+}
+
+impl SpindleEffect for TurningPhase {
+    fn about(&self) -> About {
+        let (id, does, parameters) = match self {
+            Self::TurnRatio => (
+                "turn-ratio",
+                "the mark of a setup is on a shaft that turns by another angle",
+                vec![parameter("turning", "deg/rev", 0.01)],
+            ),
+            Self::LostSamples => (
+                "lost-samples",
+                "samples of a setup are lost: from one turn on, its readings are those of later angles",
+                vec![parameter("lost", "deg", 0.3), parameter("after", "rev", 1.0)],
+            ),
+        };
+        About { id, does, acts_on: ActsOn::Setup, parameters }
+    }
+
+    fn alter(&self, target: usize, values: &[f64], alterations: &mut Alterations) {
+        let turning = &mut alterations.setups[target].turning;
+        match self {
+            Self::TurnRatio => turning.run_rad += values[0] * RAD_PER_DEG,
+            Self::LostSamples => {
+                turning.step_rad -= values[0] * RAD_PER_DEG;
+                turning.step_at = values[1];
+            }
+        }
+    }
+
+    fn partials(&self, target: usize, predicted: &Predicted) -> Vec<Vec<Complex64>> {
+        let turning = &predicted.alterations.setups[target].turning;
+        let of = |slope: &dyn Fn(usize) -> Complex64| {
+            // Without noise: H changes its size, and so would the noise of high orders.
+            let read = |at: usize| predicted.part[at] + predicted.along[at];
+            predicted.each(|reading| reading.setup == target, |order, at| slope(order) * read(at))
+        };
+        match self {
+            Self::TurnRatio => vec![of(&|order| turning.of_run_slope(order) * RAD_PER_DEG)],
+            Self::LostSamples => {
+                let [by, place] = [0, 1].map(|which| move |order: usize| turning.of_step_slopes(order)[which]);
+                vec![of(&|order| by(order) * -RAD_PER_DEG), of(&place)]
+            }
+        }
+    }
+
+    fn turn_evidence(&self) -> Option<TurnEvidence> {
+        Some(TurnEvidence::Phase)
+    }
+
+    fn phase_partials(&self, target: usize, setup: usize, phase: &PhaseCourse) -> Vec<[f64; 2]> {
+        match (self, phase.step_at) {
+            (Self::TurnRatio, None) if target == setup => vec![[RAD_PER_DEG, 0.0]],
+            (Self::LostSamples, Some(_)) if target == setup => vec![[-RAD_PER_DEG, 0.0], [0.0, 1.0]],
+            _ => Vec::new(),
+        }
+    }
+
+    fn at_phase(&self, phase: &PhaseCourse) -> Vec<f64> {
+        match phase.step_at {
+            None => vec![phase.by_rad / RAD_PER_DEG],
+            Some([turns, _]) => vec![-phase.by_rad / RAD_PER_DEG, turns],
+        }
+    }
+
+    fn first_order_like(&self) -> Option<&'static str> {
+        Some("index-offset")
+    }
+}
+
+/// How the channels of a setup turn against its mark, and over which turns they are averaged.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Turning {
+    /// Every turn, in rad.
+    pub run_rad: f64,
+    /// From one turn on, in rad.
+    pub step_rad: f64,
+    /// The turn from which on it is there.
+    pub step_at: f64,
+    /// First turn that is averaged, and the first that is not any more.
+    pub turns: [f64; 2],
+}
+
+/// A turn that neither runs nor steps.
+impl Default for Turning {
+    fn default() -> Self {
+        Self { run_rad: 0.0, step_rad: 0.0, step_at: 0.5, turns: [0.0, 1.0] }
+    }
+}
+
+/// Least |H|: an order that turns by whole periods is lost, and its readings stay finite.
+const LEAST: f64 = 1e-3;
+
+impl Turning {
+    /// H(n).
+    #[must_use]
+    pub fn response(&self, order: usize) -> Complex64 {
+        if self.run_rad == 0.0 && self.step_rad == 0.0 {
+            return Complex64::ONE;
+        }
+        let response = self.of_run(order) * self.of_step(order);
+        if response.norm() < LEAST { Complex64::from(LEAST) } else { response }
+    }
+
+    /// ∂ln H/∂(run), per rad.
+    fn of_run_slope(&self, order: usize) -> Complex64 {
+        let ([from, to], number) = (self.turns, order as f64);
+        let half = 0.5 * number * (to - from);
+        let turned = half * self.run_rad;
+        // cot x − 1/x.
+        let of_size = if turned.abs() < 1e-3 { -turned / 3.0 } else { turned.tan().recip() - turned.recip() };
+        Complex64::new(half * of_size, 0.5 * number * (from + to))
+    }
+
+    /// ∂ln H/∂(step), per rad, and ∂ln H/∂(its turn).
+    fn of_step_slopes(&self, order: usize) -> [Complex64; 2] {
+        let ([from, to], number, behind) = (self.turns, order as f64, self.share_behind());
+        let turned = Complex64::cis(number * self.step_rad);
+        let is_within = behind > 0.0 && behind < 1.0;
+        let place = if is_within { (Complex64::ONE - turned) / (to - from) } else { Complex64::ZERO };
+        [Complex64::I * number * behind * turned, place].map(|slope| slope / self.of_step(order))
+    }
+
+    fn of_run(&self, order: usize) -> Complex64 {
+        let ([from, to], number) = (self.turns, order as f64);
+        let turned = 0.5 * number * self.run_rad * (to - from);
+        let size = if turned.abs() < 1e-8 { 1.0 } else { turned.sin() / turned };
+        Complex64::from_polar(size, 0.5 * number * self.run_rad * (from + to))
+    }
+
+    fn of_step(&self, order: usize) -> Complex64 {
+        let behind = self.share_behind();
+        Complex64::from(1.0 - behind) + Complex64::cis(order as f64 * self.step_rad) * behind
+    }
+
+    fn share_behind(&self) -> f64 {
+        let [from, to] = self.turns;
+        ((to - self.step_at) / (to - from)).clamp(0.0, 1.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The mean of turns that are turned one by one.
+    #[test]
+    fn the_average_is_that_of_single_turns() {
+        let turning = Turning { run_rad: 2e-4, step_rad: 0.01, step_at: 25.0, turns: [10.0, 70.0] };
+        for order in [1, 7, 60] {
+            let of = |turn: usize| {
+                let step = if turn < 25 { 0.0 } else { 0.01 };
+                Complex64::cis(order as f64 * (2e-4 * (turn as f64 + 0.5) + step))
+            };
+            let mean = (10..70).map(of).sum::<Complex64>() / 60.0;
+            // A step and a run together are the product to first order only.
+            assert!((turning.response(order) - mean).norm() < 0.01 * order as f64, "{order}");
+            for alone in [Turning { run_rad: 0.0, ..turning }, Turning { step_rad: 0.0, ..turning }] {
+                let of = |turn: usize| {
+                    let step = if turn < 25 { 0.0 } else { alone.step_rad };
+                    Complex64::cis(order as f64 * (alone.run_rad * (turn as f64 + 0.5) + step))
+                };
+                let mean = (10..70).map(of).sum::<Complex64>() / 60.0;
+                assert!((alone.response(order) - mean).norm() < 1e-4, "{order} {alone:?}");
+            }
+        }
+    }
+}
