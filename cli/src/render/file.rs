@@ -51,7 +51,7 @@ fn map(page: &mut Page, map: &MapReport) {
     for (name, value) in &map.about {
         page.line(format_args!("  {name}: {value}"));
     }
-    page.warnings(&map.warnings);
+    page.warnings("Warnings and notes", &map.warnings);
 }
 
 fn hdf5(page: &mut Page, file: &FileReport) {
