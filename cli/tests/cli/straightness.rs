@@ -72,7 +72,7 @@ fn from_traces_to_tables() {
     let result = folder.run(&["inspect", "result.h5"]).stdout;
     assert!(result.contains("straightness") && !result.contains("harmonics"), "{result}");
 
-    let shown = folder.run(&["run", "pipeline.toml"]);
+    let shown = folder.run(&["run", "pipeline.toml", "--verbose"]);
     for word in ["STRt", "part", "slide", "neither taper", "the uncertainty is not known"] {
         assert!(shown.stdout.contains(word), "no {word} in\n{}", shown.stdout);
     }
