@@ -37,6 +37,7 @@ struct Detail {
 #[derive(Debug)]
 enum Block {
     Line(String),
+    Code(String),
     Heading(String),
     Bullet(String),
     Table(Table),
@@ -44,20 +45,16 @@ enum Block {
 
 impl Block {
     fn write(&self, width: usize, text: &mut String) {
-        let mut add = |line: &str, hanging| {
-            for line in wrap::lines(&one_line(line), width, hanging) {
-                // A string takes whatever is written to it.
-                let _ = writeln!(text, "{line}");
-            }
+        let lines = match self {
+            Self::Table(table) => return text.push_str(&table.text(width)),
+            Self::Code(line) => vec![one_line(line).into_owned()],
+            Self::Line(line) => wrap::lines(&one_line(line), width, 2),
+            Self::Bullet(line) => wrap::lines(&one_line(&format!("  - {line}")), width, 2),
+            Self::Heading(line) => [String::new()].into_iter().chain(wrap::lines(&one_line(line), width, 2)).collect(),
         };
-        match self {
-            Self::Line(line) => add(line, 2),
-            Self::Heading(heading) => {
-                add("", 0);
-                add(heading, 2);
-            }
-            Self::Bullet(line) => add(&format!("  - {line}"), 2),
-            Self::Table(table) => text.push_str(&table.text(width)),
+        for line in lines {
+            // A string takes whatever is written to it.
+            let _ = writeln!(text, "{line}");
         }
     }
 }
@@ -66,6 +63,11 @@ impl Page {
     /// Adds a line.
     pub(crate) fn line(&mut self, line: impl Display) {
         self.blocks.push(Block::Line(line.to_string()));
+    }
+
+    /// Adds a line that stays one, since it is copied.
+    pub(crate) fn code(&mut self, line: impl Display) {
+        self.blocks.push(Block::Code(line.to_string()));
     }
 
     /// Adds a heading behind an empty line.
@@ -198,14 +200,16 @@ impl Page {
                 match block {
                     Block::Line(line) => lead.push(line),
                     Block::Heading(heading) => sections.push(Section { heading, parts: Vec::new() }),
-                    Block::Bullet(_) | Block::Table(_) => {}
+                    Block::Code(_) | Block::Bullet(_) | Block::Table(_) => {}
                 }
                 continue;
             };
             match (block, section.parts.last_mut()) {
                 (Block::Heading(heading), _) => sections.push(Section { heading, parts: Vec::new() }),
-                (Block::Line(line), Some(Part::Lines(lines))) => lines.push(line.trim().to_owned()),
-                (Block::Line(line), _) => section.parts.push(Part::Lines(vec![line.trim().to_owned()])),
+                (Block::Line(line) | Block::Code(line), Some(Part::Lines(lines))) => lines.push(line.trim().to_owned()),
+                (Block::Line(line) | Block::Code(line), _) => {
+                    section.parts.push(Part::Lines(vec![line.trim().to_owned()]));
+                }
                 (Block::Bullet(line), Some(Part::List(lines))) => lines.push(line),
                 (Block::Bullet(line), _) => section.parts.push(Part::List(vec![line])),
                 (Block::Table(table), _) => section.parts.push(table.into_part()),
