@@ -82,6 +82,9 @@ pub(crate) struct RunArgs {
     /// written all the same. Without any [[limit]] that is a mistake (exit status 2).
     #[arg(long)]
     pub fail_on_limit: bool,
+    /// Print everything: turns and filters, all directions of motion, the surface, what the values are, notes, names of the files.
+    #[arg(short, long)]
+    pub verbose: bool,
     #[command(flatten)]
     pub warnings: WarningArgs,
 }
@@ -131,6 +134,9 @@ pub(crate) struct DiagnoseArgs {
     /// Write the corrected rig: the pipeline's [rig] with what was found, as a file that can replace it.
     #[arg(long, value_name = "RIG.toml")]
     pub write: Option<PathBuf>,
+    /// Print everything: all values before and after, effects that the data cannot show, notes, names of the files.
+    #[arg(short, long)]
+    pub verbose: bool,
     #[command(flatten)]
     pub warnings: WarningArgs,
 }

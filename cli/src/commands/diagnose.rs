@@ -29,9 +29,12 @@ pub(crate) fn execute(args: &DiagnoseArgs, json: bool, registry: &Registry) -> R
         pipeline.diagnose.write_rig = Some(path.clone());
     }
     let progress = Progress::new("stations");
-    let diagnosis = diagnose::diagnose(&pipeline, args.threads, &progress)?;
+    let found = diagnose::diagnosed(&pipeline, args.threads, &progress)?;
     drop(progress);
-    print(&diagnosis, json, render::diagnosis::text)?;
+    let diagnosis = &found.diagnosis;
+    print(diagnosis, json, |diagnosis| {
+        render::diagnosis::text(diagnosis, &found.summary, render::columns(), args.verbose)
+    })?;
     fail_on(diagnosis.findings().count(), args.warnings)
 }
 

@@ -12,7 +12,7 @@ use super::print;
 use crate::{
     args::PluginsArgs,
     failure::Failure,
-    render::{keys, table::Table},
+    render::{columns, keys, table::Table},
 };
 
 const EFFECT: &str = "effect";
@@ -134,7 +134,7 @@ fn list(entries: &[&Entry]) -> String {
     for entry in entries {
         table.row([entry.stage, entry.name, entry.about]);
     }
-    format!("{}\n  The keys of one: runout plugins NAME\n", table.text())
+    format!("{}\n  The keys of one: runout plugins NAME\n", table.text(columns()))
 }
 
 fn describe(entry: &Entry) -> String {

@@ -22,7 +22,7 @@ pub(crate) fn execute(args: &RunArgs, json: bool, registry: &Registry) -> Result
     let progress = Progress::new("stations");
     let summary = run::run(&pipeline, args.threads, &progress)?;
     drop(progress);
-    print(&summary, json, render::summary::text)?;
+    print(&summary, json, |summary| render::summary::text(summary, render::columns(), args.verbose))?;
     let open: Vec<String> = (summary.limits.iter())
         .filter(|limit| args.fail_on_limit && limit.decision != Decision::Conforms)
         .map(|limit| limit.limit.name())

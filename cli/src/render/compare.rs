@@ -48,7 +48,7 @@ pub(crate) fn page(comparison: &Comparison) -> Page {
     let refused: Vec<String> =
         comparison.refused.iter().map(|refusal| format!("{}: {}", refusal.method, refusal.reason)).collect();
     page.bullets("Refused", &refused);
-    page.warnings(&notes(comparison));
+    page.warnings("Warnings and notes", &notes(comparison));
     page
 }
 

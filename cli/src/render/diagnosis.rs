@@ -1,20 +1,29 @@
 //! What the closed loop found, for people.
 
-use runout_core::model::diagnosis::{Added, Blind, Diagnosis, Estimated, Level, Step};
+use runout_core::{
+    answer::Answer,
+    model::diagnosis::{Added, Blind, Diagnosis, Estimated, Level, Step},
+    summary::Summary,
+};
 
 use super::{
+    answer, count,
     foresight::WHOLE,
     number::{lacking, ranges, significant, spread, with_std},
     page::Page,
-    summary::described,
+    summary::{described, values},
     table::Table,
 };
 
-/// The text of a diagnosis.
+/// The text of a diagnosis and of the result of its final model, of a terminal of so many columns: the answer, then tables. With
+/// `verbose` everything.
 #[must_use]
-pub(crate) fn text(diagnosis: &Diagnosis) -> String {
+pub(crate) fn text(diagnosis: &Diagnosis, summary: &Summary, width: usize, verbose: bool) -> String {
     let mut page = Page::default();
-    page.line(diagnosis.headline());
+    page.line(&summary.title);
+    let answer = Answer::of(summary, Some(diagnosis));
+    answer::section(&mut page, &answer);
+    values::limits(&mut page, summary);
     if diagnosis.added.iter().any(|one| !one.confounded_with.is_empty()) {
         page.line("The stated ± include each of them");
     }
@@ -24,25 +33,28 @@ pub(crate) fn text(diagnosis: &Diagnosis) -> String {
     }
     page.headed_table("What the declared model lacks", &added(diagnosis));
     page.bullets("Confounded sets: the data do not decide which effect is present", &confounded(&diagnosis.added));
-    page.headed_table("What moved", &moved(diagnosis));
+    page.detail(format_args!("{} before and after", count(diagnosis.moved.len(), "value")), |page| {
+        page.headed_table("What moved", &moved(diagnosis));
+    });
     page.headed_table("Left, and not explained", &unexplained(diagnosis));
     page.bullets("Looked likely, and refused", &refused(diagnosis));
     // Where nothing is separated, no effect shows and none moves anything.
     if !diagnosis.nothing_separated {
-        let heading = "What these data cannot show, and what it would do all the same";
-        page.headed_table(heading, &blind(&diagnosis.blind_to));
+        page.detail(count(diagnosis.blind_to.len(), "effect") + " that the data cannot show", |page| {
+            let heading = "What these data cannot show, and what it would do all the same";
+            page.headed_table(heading, &blind(&diagnosis.blind_to));
+        });
     }
-    if let Some(lost) = &diagnosis.lost_orders {
+    if let Some(lost) = diagnosis.lost_orders.as_ref().filter(|lost| lost.0.values().any(|orders| !orders.is_empty())) {
         page.heading("Lost orders");
         for (quantity, orders) in &lost.0 {
             page.line(format_args!("  {quantity:<6}  {}", ranges(orders)));
         }
     }
     page.bullets("Put into the rig", &changes(&diagnosis.added));
-    page.warnings(&diagnosis.warnings);
-    let outputs: Vec<String> = diagnosis.outputs.iter().map(|path| path.display().to_string()).collect();
-    page.bullets("Written", &outputs);
-    page.into_text()
+    page.findings(&answer, &diagnosis.warnings, &diagnosis.notes);
+    page.written(&diagnosis.outputs);
+    page.fitted(width, verbose)
 }
 
 fn levels(diagnosis: &Diagnosis) -> Table {

@@ -51,7 +51,7 @@ fn map(page: &mut Page, map: &MapReport) {
     for (name, value) in &map.about {
         page.line(format_args!("  {name}: {value}"));
     }
-    page.warnings(&map.warnings);
+    page.warnings("Warnings and notes", &map.warnings);
 }
 
 fn hdf5(page: &mut Page, file: &FileReport) {
@@ -120,7 +120,7 @@ fn channels(page: &mut Page, file: &ChannelsReport) {
     page.line(format_args!("  the mark seems to be in: {}", file.mark.as_deref().unwrap_or("no channel")));
     page.bullets("Remarks", &file.remarks);
     page.heading("To load it");
-    file.load.lines().for_each(|line| page.line(line));
+    file.load.lines().for_each(|line| page.code(line));
 }
 
 fn csv(page: &mut Page, table: &TextReport) {

@@ -1,13 +1,17 @@
 //! Text that grows line by line, for a terminal and for a page of a report.
 
-use std::fmt::{Display, Write};
+use std::{
+    fmt::{Display, Write},
+    path::{Path, PathBuf},
+};
 
 use runout_core::{
+    answer::Answer,
     rig::Rig,
     stage::{Overview, Part, Section},
 };
 
-use super::{one_line, table::Table};
+use super::{one_line, table::Table, wrap};
 
 /// Places that a warning names on the page; all of them are in the files.
 const FEW_PLACES: usize = 8;
@@ -16,20 +20,54 @@ const FEW_PLACES: usize = 8;
 #[derive(Debug, Default)]
 pub(crate) struct Page {
     blocks: Vec<Block>,
+    /// What is shown only when it is asked for.
+    details: Vec<Detail>,
+}
+
+/// Blocks that a terminal shows only when all is asked for.
+#[derive(Debug)]
+struct Detail {
+    /// What it is, in the line that counts it.
+    what: String,
+    /// The blocks before which it stands.
+    before: usize,
+    blocks: Vec<Block>,
 }
 
 #[derive(Debug)]
 enum Block {
     Line(String),
+    Code(String),
     Heading(String),
     Bullet(String),
     Table(Table),
+}
+
+impl Block {
+    fn write(&self, width: usize, text: &mut String) {
+        let lines = match self {
+            Self::Table(table) => return text.push_str(&table.text(width)),
+            Self::Code(line) => vec![one_line(line).into_owned()],
+            Self::Line(line) => wrap::lines(&one_line(line), width, 2),
+            Self::Bullet(line) => wrap::lines(&one_line(&format!("  - {line}")), width, 2),
+            Self::Heading(line) => [String::new()].into_iter().chain(wrap::lines(&one_line(line), width, 2)).collect(),
+        };
+        for line in lines {
+            // A string takes whatever is written to it.
+            let _ = writeln!(text, "{line}");
+        }
+    }
 }
 
 impl Page {
     /// Adds a line.
     pub(crate) fn line(&mut self, line: impl Display) {
         self.blocks.push(Block::Line(line.to_string()));
+    }
+
+    /// Adds a line that stays one, since it is copied.
+    pub(crate) fn code(&mut self, line: impl Display) {
+        self.blocks.push(Block::Code(line.to_string()));
     }
 
     /// Adds a heading behind an empty line.
@@ -70,8 +108,32 @@ impl Page {
         }
     }
 
+    /// Adds the warnings that the answer does not hold, and as a detail the notes.
+    pub(crate) fn findings(&mut self, answer: &Answer, warnings: &[String], notes: &[String]) {
+        let is_new = |warning: &&String| !notes.contains(warning) && !answer.says(warning);
+        let found: Vec<String> = warnings.iter().filter(is_new).cloned().collect();
+        self.warnings("Warnings", &found);
+        self.detail(super::count(notes.len(), "note"), |page| page.warnings("Notes", notes));
+    }
+
+    /// Adds the number of files written and their folders, and as a detail their names.
+    pub(crate) fn written(&mut self, outputs: &[PathBuf]) {
+        let mut folders: Vec<&Path> = Vec::new();
+        for folder in outputs.iter().filter_map(|path| path.parent()) {
+            if !folders.contains(&folder) {
+                folders.push(folder);
+            }
+        }
+        if !folders.is_empty() {
+            let folders: Vec<String> = folders.into_iter().map(|folder| folder.display().to_string()).collect();
+            self.heading(format_args!("Written: {} in {}", super::count(outputs.len(), "file"), folders.join(", ")));
+        }
+        let names: Vec<String> = outputs.iter().map(|path| path.display().to_string()).collect();
+        self.detail("names of the files", |page| page.bullets("Written", &names));
+    }
+
     /// Adds warnings and notes. Those that differ in the place before their first colon only become one, with the places.
-    pub(crate) fn warnings(&mut self, texts: &[String]) {
+    pub(crate) fn warnings(&mut self, heading: &str, texts: &[String]) {
         let mut groups: Vec<(&str, Vec<&str>)> = Vec::new();
         for text in texts {
             let (place, said) = text.split_once(": ").unwrap_or(("", text));
@@ -86,21 +148,44 @@ impl Page {
             let shown = places[..places.len().min(FEW_PLACES)].join(", ");
             if shown.is_empty() { said.to_owned() } else { format!("{shown}{more}: {said}") }
         });
-        self.bullets("Warnings and notes", &lines.collect::<Vec<_>>());
+        self.bullets(heading, &lines.collect::<Vec<_>>());
     }
 
-    /// The text for a terminal.
+    /// Adds what a terminal shows only when all is asked for, and otherwise names by `what`; nothing where it adds nothing.
+    pub(crate) fn detail(&mut self, what: impl Display, add: impl FnOnce(&mut Self)) {
+        let mut inner = Self::default();
+        add(&mut inner);
+        if !inner.blocks.is_empty() {
+            self.details.push(Detail { what: what.to_string(), before: self.blocks.len(), blocks: inner.blocks });
+        }
+    }
+
+    /// The text for the terminal that there is.
     #[must_use]
     pub(crate) fn into_text(self) -> String {
+        self.fitted(wrap::columns(), false)
+    }
+
+    /// The text for a terminal of so many columns; with all details, or with one line that counts them.
+    #[must_use]
+    pub(crate) fn fitted(self, width: usize, verbose: bool) -> String {
+        let Self { blocks, details } = self;
         let mut text = String::new();
-        for block in self.blocks {
-            // A string takes whatever is written to it.
-            let _ = match block {
-                Block::Line(line) => writeln!(text, "{}", one_line(&line)),
-                Block::Heading(heading) => writeln!(text, "\n{}", one_line(&heading)),
-                Block::Bullet(line) => writeln!(text, "  - {}", one_line(&line)),
-                Block::Table(table) => write!(text, "{}", table.text()),
-            };
+        if verbose {
+            let mut details = details.into_iter().peekable();
+            for (index, block) in blocks.into_iter().enumerate() {
+                while let Some(detail) = details.next_if(|detail| detail.before <= index) {
+                    detail.blocks.iter().for_each(|block| block.write(width, &mut text));
+                }
+                block.write(width, &mut text);
+            }
+            details.flat_map(|detail| detail.blocks).for_each(|block| block.write(width, &mut text));
+        } else {
+            blocks.iter().for_each(|block| block.write(width, &mut text));
+            if !details.is_empty() {
+                let what: Vec<String> = details.into_iter().map(|detail| detail.what).collect();
+                Block::Heading(format!("--verbose adds: {}", what.join(", "))).write(width, &mut text);
+            }
         }
         text
     }
@@ -115,14 +200,16 @@ impl Page {
                 match block {
                     Block::Line(line) => lead.push(line),
                     Block::Heading(heading) => sections.push(Section { heading, parts: Vec::new() }),
-                    Block::Bullet(_) | Block::Table(_) => {}
+                    Block::Code(_) | Block::Bullet(_) | Block::Table(_) => {}
                 }
                 continue;
             };
             match (block, section.parts.last_mut()) {
                 (Block::Heading(heading), _) => sections.push(Section { heading, parts: Vec::new() }),
-                (Block::Line(line), Some(Part::Lines(lines))) => lines.push(line.trim().to_owned()),
-                (Block::Line(line), _) => section.parts.push(Part::Lines(vec![line.trim().to_owned()])),
+                (Block::Line(line) | Block::Code(line), Some(Part::Lines(lines))) => lines.push(line.trim().to_owned()),
+                (Block::Line(line) | Block::Code(line), _) => {
+                    section.parts.push(Part::Lines(vec![line.trim().to_owned()]));
+                }
                 (Block::Bullet(line), Some(Part::List(lines))) => lines.push(line),
                 (Block::Bullet(line), _) => section.parts.push(Part::List(vec![line])),
                 (Block::Table(table), _) => section.parts.push(table.into_part()),
@@ -145,7 +232,7 @@ mod tests {
         let mut page = Page::default();
         page.bullets("Warnings", &["a".into(), "b".into(), "a".into()]);
         page.bullets("Nothing", &[]);
-        assert_eq!(page.into_text(), "\nWarnings\n  - a (2 times)\n  - b\n");
+        assert_eq!(page.fitted(100, false), "\nWarnings\n  - a (2 times)\n  - b\n");
     }
 
     #[test]
@@ -153,9 +240,9 @@ mod tests {
         let mut page = Page::default();
         let mut texts: Vec<String> = (0..11).map(|number| format!("s{number}: few turns: 3")).collect();
         texts.insert(1, "no truth".into());
-        page.warnings(&texts);
+        page.warnings("Warnings and notes", &texts);
         let shown = "s0, s1, s2, s3, s4, s5, s6, s7 and 3 more: few turns: 3";
-        assert_eq!(page.into_text(), format!("\nWarnings and notes\n  - {shown}\n  - no truth\n"));
+        assert_eq!(page.fitted(100, false), format!("\nWarnings and notes\n  - {shown}\n  - no truth\n"));
     }
 
     #[test]
@@ -163,7 +250,7 @@ mod tests {
         let mut page = Page::default();
         page.line("station a\nb");
         page.bullets("Notes", &["a\nb: few turns".into()]);
-        assert_eq!(page.into_text(), "station a\\nb\n\nNotes\n  - a\\nb: few turns\n");
+        assert_eq!(page.fitted(100, false), "station a\\nb\n\nNotes\n  - a\\nb: few turns\n");
     }
 
     #[test]

@@ -3,15 +3,16 @@
 mod motion;
 mod named;
 mod reading;
-mod values;
+pub(super) mod values;
 
 use runout_core::{
+    answer::Answer,
     evaluate::Value,
     summary::{CaptureSummary, SectionSummary, StationSummary, Summary},
 };
 
 use super::{
-    count,
+    answer::{self, REFUTED},
     number::{lacking, place, ranges, rounded_place, significant, spread, with_std},
     page::Page,
     table::Table,
@@ -22,20 +23,18 @@ use super::{
 const FEW_STATIONS: usize = 8;
 
 /// Rejected turns that are listed one by one.
-const FEW_TURNS: usize = 12;
+const FEW_TURNS: usize = 4;
 
-/// The text of a summary.
+/// The text of a summary, of a terminal of so many columns: the answer, then tables. With `verbose` everything.
 #[must_use]
-pub(crate) fn text(summary: &Summary) -> String {
+pub(crate) fn text(summary: &Summary, width: usize, verbose: bool) -> String {
     let stations = &summary.stations;
     let mut page = Page::default();
     page.line(&summary.title);
-    refuted(&mut page, summary);
-    if stations.is_empty() {
-        named::section(&mut page, &summary.values);
-        values::limits(&mut page, summary);
-    } else {
-        page.line(count(stations.len(), "station"));
+    let answer = Answer::of(summary, None);
+    answer::section(&mut page, &answer);
+    values::limits(&mut page, summary);
+    if !stations.is_empty() {
         turns(&mut page, stations);
         // Where nothing is separated, there is no form and no motion to show.
         if stations.iter().all(|station| station.readings.is_empty()) {
@@ -44,32 +43,12 @@ pub(crate) fn text(summary: &Summary) -> String {
             reading::section(&mut page, stations);
         }
         lost_orders(&mut page, summary);
-        surface(&mut page, summary);
-        named::section(&mut page, &summary.values);
+        page.detail("surface", |page| surface(page, summary));
     }
-    page.warnings(&summary.warnings);
-    let outputs: Vec<String> = summary.outputs.iter().map(|path| path.display().to_string()).collect();
-    page.bullets("Written", &outputs);
-    page.into_text()
-}
-
-/// Behind a number that its own data refute.
-const REFUTED: &str = " !";
-
-/// Says first which values their own data refute, and by what.
-fn refuted(page: &mut Page, summary: &Summary) {
-    let (reasons, values) = summary.refuted();
-    let count: usize = reasons.iter().map(|(_, count)| count).sum();
-    if count == 0 {
-        return;
-    }
-    page.line(format_args!("The data refute {count} of {values} values, marked by{REFUTED}"));
-    for (reason, _) in reasons.iter().take(FEW_STATIONS) {
-        page.line(format_args!("  {reason}"));
-    }
-    if reasons.len() > FEW_STATIONS {
-        page.line(format_args!("  and {} more reasons: every one is listed with --json", reasons.len() - FEW_STATIONS));
-    }
+    named::section(&mut page, &summary.values);
+    page.findings(&answer, &summary.warnings, &summary.notes);
+    page.written(&summary.outputs);
+    page.fitted(width, verbose)
 }
 
 /// The mark of a number that its own data refute.
@@ -80,19 +59,25 @@ fn mark(refuted_by: Option<&String>) -> &'static str {
 /// Form, motion and what the fit leaves.
 fn separated(page: &mut Page, summary: &Summary) {
     let stations = &summary.stations;
+    // Of many stations the key values are the lowest, the median and the highest already.
+    if stations.len() <= FEW_STATIONS {
+        by_station(page, summary);
+    } else {
+        page.detail("form and error motion in all directions", |page| by_station(page, summary));
+    }
+    residual(page, stations);
+    motion_truth(page, stations);
+}
+
+fn by_station(page: &mut Page, summary: &Summary) {
+    let stations = &summary.stations;
     let form = if stations.len() <= FEW_STATIONS { form_by_station(stations) } else { form_gathered(stations) };
     page.headed_table(form_heading(stations), &form);
-    if sections(stations).any(|(_, section)| section.form_std_um.is_some()) {
-        page.line("  ± is the standard uncertainty: beside rms that of the form at any one angle");
-    }
-    if form.text().contains(STARRED) {
+    if form.contains(STARRED) {
         page.line(format_args!("  {STARRED} lacks the same lost orders"));
     }
     motion::section(page, stations);
     values::part(page, summary);
-    values::limits(page, summary);
-    residual(page, stations);
-    motion_truth(page, stations);
 }
 
 fn captures(stations: &[StationSummary]) -> impl Iterator<Item = (&StationSummary, &CaptureSummary)> {
@@ -125,14 +110,18 @@ fn turns(page: &mut Page, stations: &[StationSummary]) {
     if table.is_empty() {
         return;
     }
-    page.headed_table("Turns", &table);
+    page.detail("turns and filters", |page| conditioned(page, &table, stations));
+    rejected(page, stations);
+}
+
+fn conditioned(page: &mut Page, table: &Table, stations: &[StationSummary]) {
+    page.headed_table("Turns", table);
     let filters: Vec<String> = captures(stations).flat_map(|(_, capture)| capture.filters.clone()).collect();
     page.bullets("Filters", &filters);
     let trims = captures(stations).flat_map(|(_, capture)| {
         capture.trimmed.iter().map(|trim| format!("{}: {trim}", capture.setup)).collect::<Vec<_>>()
     });
     page.bullets("Set aside", &trims.collect::<Vec<_>>());
-    rejected(page, stations);
 }
 
 fn speeds(captures: &[&CaptureSummary]) -> String {
@@ -218,7 +207,8 @@ fn form_heading(stations: &[StationSummary]) -> String {
 
 fn form_by_station(stations: &[StationSummary]) -> Table {
     let firsts = first_values(stations);
-    let mut header = vec!["station".to_owned(), "section".into(), "z mm".into(), "rms µm".into()];
+    let mut header =
+        vec!["station".to_owned(), "section".into(), "z mm".into(), "rms µm".into(), "± at one angle µm".into()];
     header.extend(firsts.iter().map(|value| label(value)));
     header.push("true error µm".into());
     let mut table = Table::new(2, header);
@@ -229,7 +219,8 @@ fn form_by_station(stations: &[StationSummary]) -> Table {
             name.to_owned(),
             section.section.clone(),
             place(section.z_mm),
-            with_std(section.form_rms_um, section.form_std_um),
+            significant(section.form_rms_um, 4),
+            known(section.form_std_um, 2),
         ];
         let lost = lost_in(section);
         row.extend(firsts.iter().enumerate().map(|(place, first)| {
@@ -284,7 +275,7 @@ fn form_gathered(stations: &[StationSummary]) -> Table {
         lost.dedup();
         let lost = lacking(&lost);
         gather(format!("rms µm{lost}"), 4, &|section| Some(section.form_rms_um));
-        gather("rms ± µm".into(), 2, &|section| section.form_std_um);
+        gather("± at one angle µm".into(), 2, &|section| section.form_std_um);
         for first in first_values(stations) {
             let (symbol, unit) = (&first.symbol, unit(&first.unit));
             let refuted = of.iter().find_map(|section| value_of(section, symbol)?.refuted_by.as_ref());
@@ -356,11 +347,12 @@ fn motion_truth(page: &mut Page, stations: &[StationSummary]) {
 }
 
 fn lost_orders(page: &mut Page, summary: &Summary) {
-    // Measured points have no layout that could lose any.
-    if captures(&summary.stations).next().is_some() {
+    let lost = [("form", &summary.lost_orders.form), ("motion", &summary.lost_orders.motion)];
+    if lost.iter().any(|(_, orders)| !orders.is_empty()) {
         page.heading("Lost orders");
-        page.line(format_args!("  form    {}", ranges(&summary.lost_orders.form)));
-        page.line(format_args!("  motion  {}", ranges(&summary.lost_orders.motion)));
+        for (quantity, orders) in lost {
+            page.line(format_args!("  {quantity:<6}  {}", ranges(orders)));
+        }
     }
 }
 

@@ -151,8 +151,13 @@ fn scenario_to_results() {
 
     let shown = folder.run(&["run", "pipeline.toml"]);
     assert_eq!((shown.status, shown.stderr.as_str()), (0, ""), "no progress in a pipe");
-    for word in ["Turned shaft", "RONt", "Lost orders", "out/form.parquet", "true error"] {
+    for word in ["Turned shaft", "Key values", "RONt", "true error", "--verbose adds: turns and filters"] {
         assert!(shown.stdout.contains(word), "no {word} in\n{}", shown.stdout);
+    }
+    assert!(shown.stdout.lines().all(|line| line.chars().count() <= 100), "{}", shown.stdout);
+    let verbose = folder.run(&["run", "pipeline.toml", "--verbose"]);
+    for word in ["Turns", "out/form.parquet"] {
+        assert!(!shown.stdout.contains(&format!("\n{word}")) && verbose.stdout.contains(word), "{}", verbose.stdout);
     }
 }
 

@@ -120,7 +120,7 @@ fn corrected_results_are_recognisable() {
         "{}",
         &mesh[..900]
     );
-    let shown = folder.run(&["diagnose", "pipeline.toml"]);
+    let shown = folder.run(&["diagnose", "pipeline.toml", "--verbose"]);
     for word in ["Written", "out/diagnosed/form.parquet", "setups.1.part_deg = 100.18", "RONt LSCI, unfiltered µm", "°"]
     {
         assert!(shown.stdout.contains(word), "no {word} in\n{}", shown.stdout);

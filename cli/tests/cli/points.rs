@@ -189,7 +189,7 @@ fn lost_orders_are_by_what_they_are_of() {
 #[test]
 fn notes_are_no_warnings() {
     let folder = probe();
-    let ran = folder.run(&["run", "pipeline.toml", "--fail-on-warning"]);
+    let ran = folder.run(&["run", "pipeline.toml", "--fail-on-warning", "--verbose"]);
     assert_eq!(ran.status, 0, "{}{}", ran.stdout, ran.stderr);
     assert!(ran.stdout.contains("orders of lobing with evidence"), "{}", ran.stdout);
     let ran = folder.run(&["run", "pipeline.toml", "--fail-on-warning", "--set", "separate.ring_radius_mm=23"]);
@@ -201,7 +201,7 @@ fn notes_are_no_warnings() {
     assert_eq!(ran.status, 0, "{}{}", ran.stdout, ran.stderr);
     let text = ROTARY.replace("std_um = 1.5\n", "");
     std::fs::write(folder.path().join("repeats.toml"), text).unwrap();
-    let ran = folder.run(&["run", "repeats.toml", "--fail-on-warning"]);
+    let ran = folder.run(&["run", "repeats.toml", "--fail-on-warning", "--verbose"]);
     assert_eq!(ran.status, 0, "{}{}", ran.stdout, ran.stderr);
     assert!(ran.stdout.contains("is the scatter of repeats"), "{}", ran.stdout);
 }

@@ -137,6 +137,9 @@ pub struct NamedValue {
     /// absent otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub refuted_by: Option<String>,
+    /// Whether the result opens with it; absent where it does not.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub is_key: bool,
 }
 
 impl NamedValue {
@@ -156,6 +159,7 @@ impl NamedValue {
             filter: None,
             no_uncertainty: None,
             refuted_by: None,
+            is_key: false,
         }
     }
 
@@ -163,6 +167,12 @@ impl NamedValue {
     #[must_use]
     pub fn of(self, of: impl Into<String>) -> Self {
         Self { of: Some(of.into()), ..self }
+    }
+
+    /// The same as one of the few that a result opens with.
+    #[must_use]
+    pub fn key(self) -> Self {
+        Self { is_key: true, ..self }
     }
 
     /// The same, refuted by what its own data say.
@@ -186,6 +196,7 @@ impl NamedValue {
             filter: Some(value.filter.clone()),
             no_uncertainty: value.no_uncertainty.clone(),
             refuted_by: value.refuted_by.clone(),
+            is_key: false,
         }
     }
 

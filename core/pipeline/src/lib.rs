@@ -18,6 +18,7 @@
 //!
 //! `Pipeline::run` gives what was found as a [`Summary`](summary::Summary), and writes the files that `[[export]]` names.
 
+pub mod answer;
 pub mod atomic_file;
 pub mod effects;
 pub mod length_unit;

@@ -96,6 +96,29 @@ pub fn lacking(lost_orders: &[usize]) -> String {
 /// Lost orders that are listed behind a number: enough to see how they go on.
 const LISTED: usize = 3;
 
+/// Below so many µm or µrad numbers are given in nm or nrad.
+const SMALL: f64 = 0.1;
+
+/// The factor and the unit in which numbers of at most this size are read best: nm where µm would be mostly zeros.
+#[must_use]
+pub fn in_small_unit(largest: f64, unit: &str) -> (f64, &str) {
+    match unit {
+        "um" if largest > 0.0 && largest < SMALL => (1e3, "nm"),
+        "urad" if largest > 0.0 && largest < SMALL => (1e3, "nrad"),
+        _ => (1.0, unit),
+    }
+}
+
+/// A unit as the field writes it: "µm/m" of `um/m`.
+#[must_use]
+pub fn unit_text(id: &str) -> String {
+    let of_part = |part: &str| {
+        let letters = part.trim_end_matches(|character: char| !character.is_ascii_alphabetic());
+        if matches!(letters, "um" | "urad") { format!("µ{}", &part[1..]) } else { part.to_owned() }
+    };
+    id.split_inclusive(['/', '(', ' ', '·']).map(of_part).collect()
+}
+
 /// Whether two values are equal up to rounding.
 #[must_use]
 pub fn same(a: f64, b: f64) -> bool {
@@ -113,7 +136,19 @@ pub fn spread(values: impl IntoIterator<Item = f64>) -> Option<[f64; 3]> {
 
 #[cfg(test)]
 mod tests {
-    use super::{lacking, place, ranges, significant, spread, with_std};
+    use super::{in_small_unit, lacking, place, ranges, significant, spread, unit_text, with_std};
+
+    #[test]
+    fn small_numbers_have_small_units() {
+        let units = [(0.099, "um"), (0.1, "um"), (0.0, "um"), (0.01, "mm"), (0.05, "urad")];
+        assert_eq!(units.map(|(largest, unit)| in_small_unit(largest, unit).1), ["nm", "um", "um", "mm", "nrad"]);
+    }
+
+    #[test]
+    fn units_are_shown_as_the_field_writes_them() {
+        let ids = ["um", "urad", "um/m", "um/(um/m)", "um3/um2", "mm", "1", "volume/um2"];
+        assert_eq!(ids.map(unit_text), ["µm", "µrad", "µm/m", "µm/(µm/m)", "µm3/µm2", "mm", "1", "volume/µm2"]);
+    }
 
     #[test]
     fn orders_become_ranges() {

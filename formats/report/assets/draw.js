@@ -17,7 +17,19 @@ const Draw = (() => {
 
   // plotly.js reads some HTML in texts.
   const plain = (text) => text.replaceAll("&", "&amp;").replaceAll("<", "&lt;").replaceAll(">", "&gt;");
-  const label = (axis) => plain(axis.unit ? (axis.name ? `${axis.name} / ${axis.unit}` : axis.unit) : axis.name);
+  const LONGEST_LINE = 34; // Characters of a title beside an axis: a longer one goes on below.
+
+  function label(axis) {
+    const text = axis.unit ? (axis.name ? `${axis.name} / ${axis.unit}` : axis.unit) : axis.name;
+    const lines = [""];
+    for (const word of text.split(" ")) {
+      const longer = `${lines[lines.length - 1]} ${word}`.trim();
+      if (longer.length > LONGEST_LINE && lines[lines.length - 1]) lines.push(word);
+      else lines[lines.length - 1] = longer;
+    }
+    return lines.map(plain).join("<br>");
+  }
+
 
   // Digits that a standard uncertainty gives a meaning to; five significant ones without it.
   function shown(value, std) {
@@ -54,7 +66,7 @@ const Draw = (() => {
     if (!(value > 0)) return 1;
     const power = 10 ** Math.floor(Math.log10(value));
     const step = [1, 1.5, 2, 3, 4, 5, 6, 8, 10].find((one) => one * power >= value * (1 - 1e-12));
-    return (step ?? 10) * power;
+    return Number(((step ?? 10) * power).toPrecision(3));
   }
 
   // Whether angles go once around the part.
@@ -130,6 +142,17 @@ const Draw = (() => {
         hovertemplate: `%{theta:.2f}°, %{text} ${figure.y.unit}<extra>%{fullData.name}</extra>`,
       });
     });
+    // Peak and valley of a form alone: of several curves the marks would hide each other.
+    const only = curves.length === 1 && figure.id.startsWith("form") ? curves[0] : null;
+    const extremes = [];
+    if (only) {
+      for (const [name, symbol, better] of [["peak", "triangle-up", (a, b) => a > b], ["valley", "triangle-down", (a, b) => a < b]]) {
+        const at = only.values.reduce((best, value, place) => (better(value, only.values[best]) ? place : best), 0);
+        const said = `${name} ${shown(only.values[at], only.std?.[at])} ${figure.y.unit} at ${only.theta[at].toFixed(1)}°`;
+        extremes.push(said);
+        traces.push({ type: "scatterpolar", mode: "markers", name, theta: [only.theta[at]], r: [only.values[at]], marker: { color: palette[1], size: 11, symbol }, hovertemplate: `${said}<extra></extra>`, showlegend: true });
+      }
+    }
     const angular = { gridcolor: line, linecolor: faint, ticksuffix: "°", showticksuffix: "all", dtick: 45, direction: "counterclockwise", rotation: 0 };
     const radial = {
       range: [-2 * span, span], tickvals: [-span, 0, span], ticktext: [`−${span}`, "0", `+${span}`].map((text) => `${text} ${figure.y.unit}`),
@@ -151,19 +174,17 @@ const Draw = (() => {
       return same ? `${name || figure.title}: U = ${(COVERAGE * std[0]).toPrecision(2)} ${figure.y.unit}` : "";
     });
     const said = bounds.filter(Boolean);
-    return { traces, layout: place, magnification, said: said.length && said.length <= 4 ? `${said.join(", ")} (k = 2)` : "" };
+    const bound = said.length && said.length <= 4 ? `${said.join(", ")} (k = 2)` : "";
+    return { traces, layout: place, magnification, said: [...extremes, bound].filter(Boolean).join("; ") };
   }
 
-  // A horizontal line across the chart, with its name at the right.
+  // A horizontal line across the chart; its name is in the legend, where no curve is below it.
   function level(figure) {
     if (!figure.level) return {};
     const { ink } = colours();
-    const at = figure.level.value;
+    const { value: at, name } = figure.level;
     const line = { color: ink, width: 1.2, dash: "dash" };
-    return {
-      shapes: [{ type: "line", xref: "paper", x0: 0, x1: 1, yref: "y", y0: at, y1: at, line }],
-      annotations: [{ xref: "paper", x: 1, yref: "y", y: at, text: plain(figure.level.name), showarrow: false, xanchor: "right", yanchor: "bottom", font: { size: 11 } }],
-    };
+    return { shapes: [{ type: "line", xref: "paper", x0: 0, x1: 1, yref: "y", y0: at, y1: at, line, name: plain(name), showlegend: true }], showlegend: true };
   }
 
   const MOST_PLACES = 30; // Names beside each other below a chart.

@@ -156,23 +156,52 @@
     const columns = Object.fromEntries(Object.entries(data.values).map(([key, column]) => [key, column.texts ? column.rows.map((row) => column.texts[row]) : column]));
     const values = columns.shown.map((_, row) => Object.fromEntries(Object.entries(columns).map(([key, column]) => [key, column[row]])));
     const [filter, count, all] = ["filter", "shown", "all"].map((id) => document.getElementById(id));
-    const keys = ["place", "symbol", "shown", "unit", "interval", "refers", "about"];
+    const keys = ["place", "symbol", "shown", "unit", "interval", "refers", "note"];
+    // What a value is by its standard is a footnote of the rows that are shown: its number is in the row, its text below.
+    function footnoted(rows) {
+      const texts = [...new Set(rows.map((row) => row.about))];
+      rows.forEach((row) => { row.note = [row.remark.replace(/; $/, ""), `${texts.indexOf(row.about) + 1})`].filter(Boolean).join(" "); });
+      document.getElementById("footnotes").replaceChildren(...texts.map((text) => element("li", { textContent: text })));
+      return rows;
+    }
+    // Values of one quantity at several stations are one row, which opens.
+    const groups = new Map();
+    values.forEach((row) => {
+      const key = row.group ? JSON.stringify([row.group, row.symbol, row.refers, row.unit]) : row;
+      groups.set(key, [...(groups.get(key) ?? []), row]);
+    });
+    const open = new Set();
     let [rows, sorted, down] = [values, null, false];
+    const matches = (words) => (row) => { const text = [...keys.map((key) => row[key] ?? ""), row.remark, row.about].join(" ").toLowerCase(); return words.every((word) => text.includes(word)); };
+    // Lowest, median and highest, each as it is shown with its own uncertainty.
+    function gathered(key, group) {
+      const known = group.filter((row) => row.value !== null).sort((a, b) => a.value - b.value);
+      if (group.length < 2 || !known.length) return group;
+      const at = (place) => known[place].shown;
+      const [first] = group;
+      const shown = [at(0), at((known.length - 1) >> 1), at(known.length - 1)].join(" … ");
+      const head = { ...first, key, place: first.group === "stations" ? `${group.length} stations` : `${first.group}, ${group.length} stations`, shown, interval: "", value: known[(known.length - 1) >> 1].value };
+      return open.has(key) ? [head, ...group] : [head];
+    }
     const show = () => {
       const words = filter.value.toLowerCase().split(/\s+/).filter(Boolean);
-      rows = values.filter((row) => { const text = keys.map((key) => row[key]).join(" ").toLowerCase(); return words.every((word) => text.includes(word)); });
+      rows = values.filter(matches(words));
+      const listed = words.length || sorted ? [...rows] : [...groups].flatMap(([key, group]) => gathered(key, group));
       if (sorted) {
         const [key, sign] = [sorted, down ? -1 : 1];
-        rows.sort((a, b) => sign * (key === "value" ? (a.value ?? Infinity) - (b.value ?? Infinity) : a[key].localeCompare(b[key], "en", { numeric: true })));
+        listed.sort((a, b) => sign * (key === "value" ? (a.value ?? Infinity) - (b.value ?? Infinity) : String(a[key] ?? "").localeCompare(String(b[key] ?? ""), "en", { numeric: true })));
       }
       const cell = (row, key) => {
         const made = element("td", key === "shown" || key === "interval" ? { className: "number" } : {});
-        made.append(key === "place" ? element("bdi", { textContent: row[key] }) : row[key]);
+        if (key === "place" && row.key) {
+          const toggle = () => { open.has(row.key) ? open.delete(row.key) : open.add(row.key); show(); };
+          made.append(element("button", { type: "button", className: "opens", textContent: row.place, ariaExpanded: String(open.has(row.key)), onclick: toggle }));
+        } else made.append(key === "place" ? element("bdi", { textContent: row[key] }) : row[key]);
         return made;
       };
-      body.replaceChildren(...rows.slice(0, most).map((row) => element("tr", {}, ...keys.map((key) => cell(row, key)))));
-      all.hidden = rows.length <= most;
-      count.textContent = rows.length > most ? `the first ${most} of ${rows.length} values` : `${rows.length} values`;
+      body.replaceChildren(...footnoted(listed.slice(0, most)).map((row) => element("tr", {}, ...keys.map((key) => cell(row, key)))));
+      all.hidden = listed.length <= most;
+      count.textContent = listed.length > most ? `the first ${most} of ${listed.length} rows` : `${rows.length} values`;
     };
     filter.addEventListener("input", show);
     all.addEventListener("click", () => { most = Infinity; show(); });

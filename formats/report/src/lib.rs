@@ -13,6 +13,7 @@ mod closed_loop;
 mod consistency;
 mod data;
 mod facts;
+mod first;
 mod limits;
 mod origin;
 mod overview;

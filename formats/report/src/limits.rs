@@ -2,6 +2,7 @@
 
 use maud::{Markup, html};
 use runout_core::{
+    answer::limit_text,
     summary::{Decision, Limit, LimitSummary, LimitValue},
     table::number::significant,
 };
@@ -27,7 +28,7 @@ pub(crate) fn section(limits: &[LimitSummary]) -> Markup {
             h2 { "Limits" }
             @for limit in limits {
                 @let (decision, class) = word(limit.decision);
-                h3 { bdi { (shown(&limit.limit)) } " " span.badge.(class) { (decision) } }
+                h3 { bdi { (limit_text(&limit.limit)) } " " span.badge.(class) { (decision) } }
                 @let sorted = by_risk(limit);
                 @if sorted.is_empty() { p { "No value has this name." } }
                 @if !sorted.is_empty() { (table(&limit.limit, &sorted[..sorted.len().min(SHOWN)])) }
@@ -46,12 +47,22 @@ pub(crate) fn section(limits: &[LimitSummary]) -> Markup {
     }
 }
 
-/// "RONt of section a ≤ 5 µm".
-pub(crate) fn shown(limit: &Limit) -> String {
-    let name = limit.name();
-    match name.strip_suffix(&limit.unit) {
-        Some(rest) => format!("{rest}{}", symbol(&limit.unit)),
-        None => name,
+/// A limit as a row: its name, the value nearest to breaking it, and the decision.
+pub(crate) fn worst(limit: &LimitSummary) -> Markup {
+    let (decision, class) = word(limit.decision);
+    let sorted = by_risk(limit);
+    // The reason of the decision is that of a value that it follows from.
+    let deciding = sorted.iter().find(|value| value.decision == limit.decision);
+    html! {
+        tr {
+            td {
+                bdi { (limit_text(&limit.limit)) }
+                @if let Some(missing) = deciding.and_then(|value| value.missing.as_ref()) { br; small { (missing) } }
+            }
+            td.number { @if let Some(value) = deciding { (digits(value.value, value)) } }
+            td { @if let Some(value) = deciding { (bar(&limit.limit, value, word(value.decision).1)) } }
+            td { span.badge.(class) { (decision) } }
+        }
     }
 }
 

@@ -40,14 +40,13 @@ pub(crate) fn turns(summary: &Summary) -> Markup {
     }
 }
 
-/// What the user should know.
-pub(crate) fn warnings(summary: &Summary) -> Markup {
+/// Notes: what the layout cannot separate, what the result is made of. The warnings are on the first screen.
+pub(crate) fn notes(summary: &Summary) -> Markup {
     html! {
-        @if !summary.warnings.is_empty() {
-            section #warnings {
-                h2 { "Warnings and notes" }
+        @if !summary.notes.is_empty() {
+            section #notes {
+                h2 { "Notes" }
                 ul {
-                    @for warning in summary.findings() { li.warning { bdi { (warning) } } }
                     @for note in &summary.notes { li { bdi { (note) } } }
                 }
             }

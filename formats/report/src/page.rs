@@ -2,13 +2,13 @@
 
 use base64::{Engine, prelude::BASE64_STANDARD};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
-use runout_core::{Error, Result, stage::Completed, table::panels::Panels};
+use runout_core::{Error, Result, answer::Answer, rig::Rig, stage::Completed, table::panels::Panels};
 use sha2::{Digest, Sha256};
 
 use crate::{
     closed_loop, consistency,
     data::{self, Data, FigureData},
-    facts, limits, origin, overview, rig,
+    facts, first, limits, origin, overview, rig,
     values::Columns,
 };
 
@@ -31,22 +31,24 @@ pub(crate) fn page(title: &str, figures: &[Panels], result: &Completed) -> Resul
     let surface_data = surface.map(data::surface);
     let declared = || rig::declared(&summary.provenance.configuration);
     let rig = overview.and_then(|overview| overview.rig.clone()).or_else(declared);
-    let (verdict, class) = match overview {
-        Some(overview) => (overview.headline.clone(), "plain"),
-        None => facts::verdict(summary, diagnosis),
+    let answer = overview.is_none().then(|| Answer::of(summary, diagnosis));
+    let (verdict, class) = match (&answer, overview) {
+        (Some(answer), _) => (answer.verdict.sentence.as_str(), first::class(answer.verdict.judgement)),
+        (None, overview) => (overview.map_or("", |overview| overview.headline.as_str()), "plain"),
     };
+    // The first figure is the one to look at first; the others follow below.
+    let lead = usize::from(answer.is_some() && !drawn.is_empty());
     let body = html! {
         header {
             h1 { bdi { (title) } }
             @if !verdict.is_empty() { p.verdict.(class) role="status" { bdi { (verdict) } } }
-            @if overview.is_none() { (facts::list(summary, rig.as_ref(), surface)) }
         }
-        @if let Some(rig) = &rig { section #rig { h2 { "Rig" } (rig::drawing(rig)) } }
-        @if !summary.limits.is_empty() { (limits::section(&summary.limits)) }
-        @if !drawn.is_empty() {
+        @if let Some(answer) = &answer { (first::screen(answer, summary, drawn.first().map(|figure| chart(0, figure)))) }
+        @if let Some(rig) = rig.as_ref().filter(|_| overview.is_some()) { (rig_section(rig)) }
+        @if drawn.len() > lead {
             section #figures {
                 h2 { "Figures" }
-                div.charts { @for (index, figure) in drawn.iter().enumerate() { (chart(index, figure)) } }
+                div.charts { @for (index, figure) in drawn.iter().enumerate().skip(lead) { (chart(index, figure)) } }
             }
         }
         @if let Some(map) = &surface_data {
@@ -56,17 +58,26 @@ pub(crate) fn page(title: &str, figures: &[Panels], result: &Completed) -> Resul
                 div.map data-map="surface" {}
             }
         }
+        @if !summary.limits.is_empty() { (limits::section(&summary.limits)) }
         @if let Some(diagnosis) = diagnosis { (closed_loop::section(diagnosis)) }
         @if let Some(overview) = overview { (overview::sections(overview)) }
         @if values.count() > 0 { (table(values.count())) }
         (consistency::section(summary))
         (origin::turns(summary))
-        (origin::warnings(summary))
+        (origin::notes(summary))
+        @if overview.is_none() {
+            section #facts { h2 { "Part and measurement" } (facts::list(summary, rig.as_ref(), surface)) }
+            @if let Some(rig) = &rig { (rig_section(rig)) }
+        }
         (origin::provenance(summary, about))
     };
     let data = Data { figures: drawn, surface: surface_data, values: &values };
     let json = serde_json::to_string(&data).map_err(|error| Error::caused("write", "the report's data", error))?;
     Ok(document(title, &body, &json))
+}
+
+fn rig_section(rig: &Rig) -> Markup {
+    html! { section #rig { h2 { "Rig" } (rig::drawing(rig)) } }
 }
 
 fn chart(index: usize, figure: &FigureData) -> Markup {
@@ -98,14 +109,16 @@ fn table(count: usize) -> Markup {
                             th scope="col" { button type="button" data-key="symbol" { "symbol" } }
                             th.number scope="col" { button type="button" data-key="value" { "value ± std" } }
                             th scope="col" { button type="button" data-key="unit" { "unit" } }
-                            th.number scope="col" { "95 % interval" }
+                            th.number scope="col" { "95 % coverage interval" }
                             th scope="col" { button type="button" data-key="refers" { "reference, filter" } }
-                            th scope="col" { "standard, band" }
+                            th scope="col" { "note" }
                         }
                     }
                     tbody {}
                 }
             }
+            p.note { "A row of several stations opens by a click. Numbers of notes:" }
+            ol #footnotes.note {}
         }
     }
 }

@@ -26,7 +26,11 @@ struct Row {
     interval: String,
     /// Reference and filter.
     refers: String,
-    /// Standard and clause, and what is not in the value.
+    /// Values of one quantity at several stations have the same: of a section, of all of a station.
+    group: String,
+    /// What is not in the value, and what its data say against it.
+    remark: String,
+    /// Standard and clause, and band.
     about: String,
 }
 
@@ -41,6 +45,8 @@ pub(crate) struct Columns {
     unit: Column,
     interval: Vec<String>,
     refers: Column,
+    group: Column,
+    remark: Column,
     about: Column,
 }
 
@@ -77,6 +83,8 @@ impl Columns {
             all.unit.add(row.unit);
             all.interval.push(row.interval);
             all.refers.add(row.refers);
+            all.group.add(row.group);
+            all.remark.add(row.remark);
             all.about.add(row.about);
         }
         all
@@ -102,8 +110,8 @@ fn rows(summary: &Summary) -> Vec<Row> {
         };
         let lacks = match value.lost_orders.len() {
             0 => String::new(),
-            1 => format!("; order {} is lost", value.lost_orders[0]),
-            count => format!("; {count} orders are lost, the first is {}", value.lost_orders[0]),
+            1 => format!("order {} is lost; ", value.lost_orders[0]),
+            count => format!("{count} orders are lost, the first is {}; ", value.lost_orders[0]),
         };
         Row {
             place: one_line(&place),
@@ -114,14 +122,17 @@ fn rows(summary: &Summary) -> Vec<Row> {
             unit: symbol(&value.unit),
             interval: uncertainty.map_or_else(String::new, |known| interval((known.interval_95, known.std))),
             refers: [value.reference.as_str(), value.filter.as_str()].join(", "),
-            about: format!(
-                "{}; {} to {} UPR{lacks}{}{}",
-                value.source,
-                value.band_upr[0],
-                value.band_upr[1],
-                value.raised_by_noise.map_or_else(String::new, |by| format!("; noise raises it by {by:.2e}")),
+            group: match (placed.station, placed.section) {
+                (Some(_), Some(section)) => format!("section {}", one_line(section)),
+                (Some(_), None) => "stations".into(),
+                (None, _) => String::new(),
+            },
+            remark: format!(
+                "{lacks}{}{}",
+                value.raised_by_noise.map_or_else(String::new, |by| format!("raised by noise, by {by:.2e}; ")),
                 reason(value.refuted_by.as_ref())
             ),
+            about: format!("{}; {} to {} UPR", value.source, value.band_upr[0], value.band_upr[1]),
         }
     });
     let named = summary.values.iter().map(|value| Row {
@@ -134,7 +145,9 @@ fn rows(summary: &Summary) -> Vec<Row> {
         unit: symbol(&value.unit),
         interval: value.interval_95.zip(value.std).map_or_else(String::new, interval),
         refers: [&value.reference, &value.filter].into_iter().flatten().cloned().collect::<Vec<_>>().join(", "),
-        about: format!("{}{}", value.about, reason(value.refuted_by.as_ref())),
+        group: String::new(),
+        remark: reason(value.refuted_by.as_ref()),
+        about: value.about.clone(),
     });
     of_form.chain(named).collect()
 }
@@ -145,7 +158,7 @@ fn mark(refuted_by: Option<&String>) -> &'static str {
 }
 
 fn reason(refuted_by: Option<&String>) -> String {
-    refuted_by.map_or_else(String::new, |by| format!("; ! its own data refute it: {}", one_line(by)))
+    refuted_by.map_or_else(String::new, |by| format!("! its own data refute it: {}", one_line(by)))
 }
 
 fn finite(number: f64) -> Option<f64> {

@@ -190,7 +190,7 @@ impl LinearModel for Quadrature {
         let mut remarks = vec![blocks];
         remarks.extend(correction.remarks());
         let values = fit.values().into_iter().map(|found| {
-            NamedValue::new(&found.value, found.number, found.std, &found.unit, "declared part of the signal")
+            NamedValue::new(&found.value, found.number, found.std, &found.unit, "declared part of the signal").key()
         });
         Ok(Outcome {
             convention: ANGLE.into(),

@@ -205,7 +205,7 @@ impl LinearModel for RTest {
         let values = fit
             .values()
             .into_iter()
-            .map(|found| NamedValue::new(&found.value, found.number, found.std, &found.unit, about));
+            .map(|found| NamedValue::new(&found.value, found.number, found.std, &found.unit, about).key());
         let convention = "actual less nominal place of the ball, in machine coordinates".into();
         Ok(Outcome { convention, values: values.collect(), remarks, ..Outcome::default() })
     }

@@ -369,7 +369,7 @@ pub(crate) fn location_values(axis: Axis, found: [Estimate; 4]) -> Vec<NamedValu
             } else {
                 (1e6, "urad", "location error: tilt of the axis' average line (ISO 230-1)")
             };
-            NamedValue::new(&symbol, scale * one.value, scale * one.std, unit, about)
+            NamedValue::new(&symbol, scale * one.value, scale * one.std, unit, about).key()
         })
         .collect();
     values.sort_by(|a, b| (&b.unit == "um", &a.symbol).cmp(&(&a.unit == "um", &b.symbol)));

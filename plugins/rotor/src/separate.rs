@@ -264,7 +264,7 @@ impl Solution {
         let mut values = Vec::new();
         for (index, mode) in self.at_rest.iter().enumerate() {
             let about = "natural frequency at rest";
-            values.push(exact("f", hertz(mode.frequency()), "Hz", about).of(format!("mode {}", index + 1)));
+            values.push(exact("f", hertz(mode.frequency()), "Hz", about).key().of(format!("mode {}", index + 1)));
         }
         for (index, critical) in self.critical.iter().enumerate() {
             let of = match self.whirl(&critical.mode) {
@@ -272,7 +272,7 @@ impl Solution {
                 whirl => format!("{} {}", index + 1, whirl.name()),
             };
             let about = "critical speed: a natural frequency is the speed";
-            values.push(exact("n_crit", rpm(critical.speed), "rpm", about).of(of));
+            values.push(exact("n_crit", rpm(critical.speed), "rpm", about).key().of(of));
         }
         for (index, (from, to)) in avoid::joined(&self.ranges).into_iter().enumerate() {
             let of = format!("range {}", index + 1);

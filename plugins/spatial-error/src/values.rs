@@ -123,7 +123,7 @@ fn of_compensation(queries: &[At]) -> [NamedValue; 2] {
     };
     let before = rms(known().map(|(query, _)| expected(query.error_um, query)).sum());
     let after = rms(known().map(|(query, correction)| expected(correction.remains_um, query)).sum());
-    let value = |symbol: &str, number: f64, about: &str| NamedValue::new(symbol, number, f64::NAN, "um", about);
+    let value = |symbol: &str, number: f64, about: &str| NamedValue::new(symbol, number, f64::NAN, "um", about).key();
     [
         value(
             "error_rms",

@@ -144,7 +144,7 @@ impl Found<'_> {
         let [mean, std] = self.mean().unwrap_or([f64::NAN; 2]);
         let about = "mean pre-travel and stylus, over the time of the campaign: reading less ring radius; holds the error of the ring's radius, \
              and a scale error common to X and Y, one to one";
-        let mut values = vec![NamedValue::new("pretravel_mean", mean, std, "um", about)];
+        let mut values = vec![NamedValue::new("pretravel_mean", mean, std, "um", about).key()];
         let Ranges { before, after, without_form, by_repeats, .. } = self.ranges;
         let held = if by_repeats { "a repeat" } else { "touches" };
         let of_ranges = [
@@ -157,13 +157,8 @@ impl Found<'_> {
             ),
         ];
         for (symbol, range, about) in of_ranges {
-            values.push(NamedValue::new(
-                symbol,
-                range.um,
-                range.std_um,
-                "um",
-                &format!("range, mean over passes: {about}"),
-            ));
+            let about = format!("range, mean over passes: {about}");
+            values.push(NamedValue::new(symbol, range.um, range.std_um, "um", &about).key());
         }
         for lobe in lobes {
             let of = |number: f64| if lobe.observable { number } else { f64::NAN };

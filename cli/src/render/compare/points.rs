@@ -24,7 +24,7 @@ pub(crate) fn page(mut page: Page, comparison: &Comparison) -> Page {
     let refused: Vec<String> =
         comparison.refused.iter().map(|refusal| format!("{}: {}", refusal.method, refusal.reason)).collect();
     page.bullets("Refused", &refused);
-    page.warnings(&super::notes(comparison));
+    page.warnings("Warnings and notes", &super::notes(comparison));
     page
 }
 

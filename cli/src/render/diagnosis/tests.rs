@@ -2,6 +2,7 @@ use insta::assert_snapshot;
 use runout_core::model::diagnosis::{BiasPerUnit, LostOrders, Moved, Refused, Truth, Unexplained, Verdict};
 
 use super::*;
+use crate::render::wrap::within;
 
 fn level(residual_rms_um: f64, chi2_per_dof: f64) -> Level {
     Level {
@@ -132,12 +133,23 @@ fn diagnosed() -> Diagnosis {
 
 #[test]
 fn nothing_to_add() {
-    assert_snapshot!(text(&at_the_floor()));
+    assert_snapshot!(text(&at_the_floor(), &Summary::default(), 100, true));
+}
+
+/// The loop in three lines, then tables; without `--verbose`.
+#[test]
+fn the_answer_comes_first_at_80_and_120_columns() {
+    for (terminal, name) in [(80, "answer_at_80_columns"), (120, "answer_at_120_columns")] {
+        let width = within(terminal);
+        let shown = text(&diagnosed(), &Summary::default(), width, false);
+        assert!(shown.lines().all(|line| line.chars().count() <= width), "{shown}");
+        assert_snapshot!(name, shown);
+    }
 }
 
 #[test]
 fn found_and_left() {
-    assert_snapshot!(text(&diagnosed()));
+    assert_snapshot!(text(&diagnosed(), &Summary::default(), 100, true));
 }
 
 #[test]
@@ -167,7 +179,7 @@ fn noise_that_is_not_known_and_another_unit() {
         lost_orders: None,
         ..at_the_floor()
     };
-    assert_snapshot!(text(&diagnosis));
+    assert_snapshot!(text(&diagnosis, &Summary::default(), 100, true));
 }
 
 #[test]
@@ -178,6 +190,11 @@ fn what_acts_on_the_rig_or_on_one_setup_is_distinguished() {
         targets: targets.iter().map(|target| (*target).to_owned()).collect(),
         bias_per_unit: bias_per_unit.clone(),
     };
-    let shown = text(&Diagnosis { blind_to: vec![one(&[]), one(&["a"]), one(&["b"])], ..at_the_floor() });
+    let shown = text(
+        &Diagnosis { blind_to: vec![one(&[]), one(&["a"]), one(&["b"])], ..at_the_floor() },
+        &Summary::default(),
+        100,
+        true,
+    );
     assert!(shown.contains("the whole rig, a, b"), "{shown}");
 }

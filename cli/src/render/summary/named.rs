@@ -40,11 +40,9 @@ pub(super) fn section(page: &mut Page, values: &[NamedValue]) {
         found.map_or_else(String::new, number)
     };
     if symbols.len() > MOST_COLUMNS {
-        let header = std::iter::once("").chain(things.iter().copied()).chain(["what it is"]);
-        let mut table = Table::new(1, header);
+        let mut table = Table::new(1, std::iter::once("").chain(things.iter().copied()));
         for value in symbols {
-            let numbers = things.iter().map(|thing| of(thing, value));
-            table.row(std::iter::once(label(value)).chain(numbers).chain([value.about.clone()]));
+            table.row(std::iter::once(label(value)).chain(things.iter().map(|thing| of(thing, value))));
         }
         page.headed_table("Values", &table);
     } else if !symbols.is_empty() {
@@ -54,13 +52,6 @@ pub(super) fn section(page: &mut Page, values: &[NamedValue]) {
             table.row(std::iter::once(thing.to_owned()).chain(symbols.iter().map(|value| of(thing, value))));
         }
         page.headed_table("Values", &table);
-        let mut said: Vec<&str> = Vec::new();
-        for value in symbols {
-            if !said.contains(&value.symbol.as_str()) {
-                page.line(format_args!("  {}: {}", value.symbol, value.about));
-                said.push(&value.symbol);
-            }
-        }
     }
     let others = || values.iter().filter(|value| !shared(value));
     // What all values are referred to and filtered by is said once.
@@ -68,14 +59,30 @@ pub(super) fn section(page: &mut Page, values: &[NamedValue]) {
     let alike =
         |one: &NamedValue, other: &NamedValue| (&one.reference, &one.filter) == (&other.reference, &other.filter);
     let common = standard.first().filter(|first| standard.len() > 1 && standard.iter().all(|one| alike(one, first)));
-    let mut table = Table::new(2, ["value", "of", "number ± std", "unit", "what it is"]);
+    let mut table = Table::new(2, ["value", "of", "number ± std", "unit"]);
     for value in others() {
         let of = value.of.clone().unwrap_or_default();
         let name = if common.is_some() { value.symbol.clone() } else { name(value) };
-        table.row([name, of, number(value), unit(&value.unit), value.about.clone()]);
+        table.row([name, of, number(value), unit(&value.unit)]);
     }
     let about = common.map_or_else(String::new, |first| format!(": {}", basis(first)));
     page.headed_table(format_args!("Values of the whole{about}"), &table);
+    page.detail("what the values are", |page| definitions(page, values));
+}
+
+/// What each symbol is, with standard and clause: each text once, behind all symbols that it is of.
+fn definitions(page: &mut Page, values: &[NamedValue]) {
+    let mut said: Vec<(&str, Vec<&str>)> = Vec::new();
+    for value in values {
+        match said.iter_mut().find(|(about, _)| *about == value.about) {
+            Some((_, symbols)) if symbols.contains(&&*value.symbol) => {}
+            Some((_, symbols)) => symbols.push(&value.symbol),
+            None => said.push((&value.about, vec![&value.symbol])),
+        }
+    }
+    let lines: Vec<String> =
+        said.into_iter().map(|(about, symbols)| format!("{}: {about}", symbols.join(", "))).collect();
+    page.bullets("What the values are", &lines);
 }
 
 /// "STRt LSLI, unfiltered µm"; of a domain's own values symbol and unit.

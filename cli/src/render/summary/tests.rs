@@ -10,6 +10,7 @@ use runout_core::{
 };
 
 use super::text;
+use crate::render::wrap::within;
 
 fn capture(setup: &str, rejected: usize) -> CaptureSummary {
     let turn = |turn| RejectedTurnSummary { turn, start_sample: 512 * turn as u64, reason: "S2: clipped".into() };
@@ -139,15 +140,38 @@ fn summary(stations: usize) -> Summary {
 
 #[test]
 fn few_stations_stand_row_by_row() {
-    assert_snapshot!(text(&summary(2)));
+    assert_snapshot!(text(&summary(2), 100, true));
 }
 
 #[test]
 fn one_station_has_its_error_motion_with_uncertainty() {
-    assert_snapshot!(text(&summary(1)));
+    assert_snapshot!(text(&summary(1), 100, true));
 }
 
 #[test]
 fn many_stations_are_gathered() {
-    assert_snapshot!(text(&summary(40)));
+    assert_snapshot!(text(&summary(40), 100, true));
+}
+
+/// Without `--verbose` the answer and the tables fit a screen, whatever the terminal.
+#[test]
+fn the_answer_comes_first_at_80_and_120_columns() {
+    for (terminal, name) in [(80, "answer_at_80_columns"), (120, "answer_at_120_columns")] {
+        let width = within(terminal);
+        let shown = text(&summary(40), width, false);
+        assert!(shown.lines().all(|line| line.chars().count() <= width), "{shown}");
+        assert!(shown.lines().nth(1).is_some_and(|line| line.starts_with("The residual agrees")), "{shown}");
+        assert_snapshot!(name, shown);
+    }
+}
+
+/// A value whose data refute it has its mark at the number, and the verdict says so.
+#[test]
+fn what_the_data_refute_is_marked_where_it_is_printed() {
+    let mut refuted = summary(1);
+    let by = "s00: the residual is 10.19 times the noise";
+    for section in &mut refuted.stations[0].sections {
+        section.values.iter_mut().for_each(|value| value.refuted_by = Some(by.into()));
+    }
+    assert_snapshot!(text(&refuted, 100, false));
 }

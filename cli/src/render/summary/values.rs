@@ -1,6 +1,7 @@
 //! Values of all sections together, and limits.
 
 use runout_core::{
+    answer::limit_text,
     evaluate::Value,
     summary::{Decision, LimitSummary, LimitValue, Summary},
 };
@@ -26,24 +27,24 @@ pub(crate) fn part(page: &mut Page, summary: &Summary) {
 
 /// What was found of each limit, by the worst of the values that decide it.
 pub(crate) fn limits(page: &mut Page, summary: &Summary) {
-    let mut table = Table::new(1, ["limit", "values", "proven", "the worst", "95 % interval", "decision"]);
+    let mut table = Table::new(2, ["limit", "decision", "values", "proven", "the worst", "95 % interval"]);
     for limit in &summary.limits {
         let worst = deciding(limit);
         let proven = limit.values.iter().filter(|value| value.decision == Decision::Conforms).count();
         let interval = worst.and_then(|value| value.interval_95);
         table.row([
-            limit.limit.name(),
+            limit_text(&limit.limit),
+            decided(limit, worst),
             limit.values.len().to_string(),
             proven.to_string(),
             known(worst.map(|value| value.value), 4),
             interval.map_or_else(String::new, |ends| ends.map(|end| significant(end, 4)).join(" to ")),
-            decided(limit, worst),
         ]);
     }
     page.headed_table("Limits", &table);
     let beyond = summary.limits.iter().flat_map(|limit| {
         let open = limit.values.iter().filter(|value| value.decision != Decision::Conforms);
-        open.map(|value| format!("{}: {}", limit.limit.name(), place(value)))
+        open.map(|value| format!("{}: {}", limit_text(&limit.limit), place(value)))
     });
     let mut beyond: Vec<String> = beyond.collect();
     let more = beyond.len().saturating_sub(FEW_STATIONS);

@@ -22,6 +22,7 @@ use crate::{
     atomic_file::PendingFile,
     points::Points,
     stage::{PointModel, PointSeparator, Source, Station, StationModel, StationSeparator},
+    summary::Summary,
 };
 use runout_closed_loop::{
     Effect, Setting, closed_loop,
@@ -38,6 +39,24 @@ use runout_turning::{profile::Profile, separation::Quantity};
 /// # Errors
 /// When the data or a file fails, or the separator has no model for the loop. Exports that had begun leave nothing behind.
 pub fn diagnose(pipeline: &Pipeline, threads: Option<NonZeroUsize>, observer: &dyn Observer) -> Result<Diagnosis> {
+    Ok(diagnosed(pipeline, threads, observer)?.diagnosis)
+}
+
+/// What the closed loop found, with the result of its final model.
+#[derive(Debug, Clone)]
+#[non_exhaustive]
+pub struct Diagnosed {
+    /// What was found.
+    pub diagnosis: Diagnosis,
+    /// The result of the final model.
+    pub summary: Summary,
+}
+
+/// The same, with the result of the final model.
+///
+/// # Errors
+/// As [`diagnose`] has.
+pub fn diagnosed(pipeline: &Pipeline, threads: Option<NonZeroUsize>, observer: &dyn Observer) -> Result<Diagnosed> {
     let source = pipeline.loader.open(&pipeline.request())?;
     let no_model = |separator: &str| {
         Error::new("diagnose", &pipeline.title, format!("`{separator}` has no model of effects for the closed loop"))
@@ -79,7 +98,7 @@ fn diagnose_turns(
     threads: Option<NonZeroUsize>,
     (separator, model): (&dyn StationSeparator, &dyn StationModel),
     observer: &dyn Observer,
-) -> Result<Diagnosis> {
+) -> Result<Diagnosed> {
     let recording = line.recording;
     spare_inputs(&pipeline.diagnosed_outputs(), &recording.inputs())?;
     let mut stations: Vec<Station> = Vec::new();
@@ -181,7 +200,7 @@ fn diagnose_points(
     points: &Points,
     (separator, model): (&dyn PointSeparator, &dyn PointModel),
     observer: &dyn Observer,
-) -> Result<Diagnosis> {
+) -> Result<Diagnosed> {
     spare_inputs(&pipeline.diagnosed_outputs(), &points.inputs())?;
     let effects = model.effects_of(points)?;
     let settings = if model.points_name_targets() {
@@ -236,14 +255,14 @@ fn corrections(changes: &[Change]) -> Vec<Correction> {
 }
 
 /// Gives the exports their names, and the diagnosis, which lists them, with them.
-fn commit(mut exports: Finished, path: Option<PathBuf>) -> Result<Diagnosis> {
+fn commit(mut exports: Finished, path: Option<PathBuf>) -> Result<Diagnosed> {
     let missing = || Error::new("diagnose", "the pipeline", "the result has no diagnosis");
     let mut diagnosis = exports.diagnosis().ok_or_else(missing)?;
     diagnosis.outputs = exports.outputs();
     diagnosis.outputs.extend(path.clone());
     let written = path.map(|path| pending(path, &diagnosis)).transpose()?;
-    exports.commit(written)?;
-    Ok(diagnosis)
+    let summary = exports.commit(written)?;
+    Ok(Diagnosed { diagnosis, summary })
 }
 
 /// `diagnosis.json`, written and waiting for its name.
