@@ -28,6 +28,7 @@ pub fn registry() -> Registry {
         runout_obj::register,
         runout_figures::register,
         runout_report::register,
+        runout_values::register,
     ] {
         register(&mut registry);
     }

@@ -115,3 +115,51 @@ class Report:
 
     path: str
     """The file to write, relative to the TOML: `out/report.html`."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Csv:
+    """Values with their uncertainties, limits and decisions as CSV, one row each"""
+
+    plugin: ClassVar[str] = "csv"
+
+    decimal_comma: Union[bool, None] = None
+    """Decimal commas, and semicolons between cells, as spreadsheets of many countries expect. Default: false."""
+
+    path: str
+    """The file to write, ending in `.csv`: one row a value and limit."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Xlsx:
+    """Values with limits as an Excel workbook, coloured by decision, and a sheet a table that is asked for"""
+
+    plugin: ClassVar[str] = "xlsx"
+
+    path: str
+    """The file to write, ending in `.xlsx`. Its first sheet has the values."""
+
+    tables: Union[Sequence[str], None] = None
+    """Tables of the result that have a sheet too, by their names: `["form", "harmonics"]`."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class QDas:
+    """Values with their limits in the Q-DAS ASCII transfer format (.dfq)"""
+
+    plugin: ClassVar[str] = "q-das"
+
+    only_limited: Union[bool, None] = None
+    """Only values that a limit names; with `false` all values. Default: true."""
+
+    part: Union[str, None] = None
+    """Description of the part (K1002); the pipeline's title without it."""
+
+    part_number: Union[str, None] = None
+    """Number of the part (K1001)."""
+
+    path: str
+    """The file to write, ending in `.dfq`: one characteristic a value and limit."""
+
+    time: Union[str, None] = None
+    """When it was measured (K0004), as `28.11.2026/14:30:00`."""

@@ -159,6 +159,9 @@ fn table(exporter: &str, folder: &str) -> String {
         "obj" => "/part.obj",
         "x3p" => "/part.x3p",
         "sdf" => "/part.sdf",
+        "csv" => "/values.csv",
+        "xlsx" => "/values.xlsx",
+        "q-das" => "/values.dfq",
         _ => "",
     };
     format!("[[export]]\nplugin = '{exporter}'\npath = '{folder}{file}'\n")
@@ -212,7 +215,10 @@ fn every_exporter_writes_every_domain_or_is_refused_in_words() {
             pipeline(path, &format!("{text}{tables}"), &registry).unwrap_or_else(|error| panic!("{name}: {error}"));
         let summary = all.run().unwrap_or_else(|error| panic!("{name}: {error}"));
         assert_eq!(tables.contains("gltf"), has_surface, "{name}");
-        for ending in ["parquet", "h5", "html", "svg", "png", "json"].into_iter().chain(has_surface.then_some("glb")) {
+        for ending in ["parquet", "h5", "html", "svg", "png", "json", "csv", "xlsx"]
+            .into_iter()
+            .chain(has_surface.then_some("glb"))
+        {
             let file = summary.outputs.iter().find(|path| path.extension().is_some_and(|found| found == ending));
             let file = file.unwrap_or_else(|| panic!("{name}: no {ending} in {:?}", summary.outputs));
             assert!(fs::metadata(file).unwrap().len() > 100, "{name}: {}", file.display());
