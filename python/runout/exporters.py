@@ -92,6 +92,66 @@ class Obj:
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
+class Ply:
+    """Writes the surface as a PLY mesh in mm, with colour and the deviation as quality"""
+
+    plugin: ClassVar[str] = "ply"
+
+    capped: Union[bool, None] = None
+    """Closes both ends of a part with flat discs, so that the mesh is a solid. A height map has no ends. Default: false."""
+
+    colour_range_um: Union[float, None] = None
+    """Deviation of the two strongest colours, ± µm; without it the largest deviation."""
+
+    magnification: Union[float, None] = None
+    """Also writes a second file beside it, `NAME-x1000` for 1000, with the deviations from the nominal radius, or the heights of a
+    map, drawn so many times larger. Above 1, at most 1000000."""
+
+    path: str
+    """The file to write; the mesh in it is at true scale."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Stl:
+    """Writes the surface as a binary STL mesh in mm, without colours"""
+
+    plugin: ClassVar[str] = "stl"
+
+    capped: Union[bool, None] = None
+    """Closes both ends of a part with flat discs, so that the mesh is a solid. A height map has no ends. Default: false."""
+
+    colour_range_um: Union[float, None] = None
+    """Deviation of the two strongest colours, ± µm; without it the largest deviation."""
+
+    magnification: Union[float, None] = None
+    """Also writes a second file beside it, `NAME-x1000` for 1000, with the deviations from the nominal radius, or the heights of a
+    map, drawn so many times larger. Above 1, at most 1000000."""
+
+    path: str
+    """The file to write; the mesh in it is at true scale."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Format3mf:
+    """Writes the surface as a 3MF mesh in mm, coloured by deviation, for printing"""
+
+    plugin: ClassVar[str] = "3mf"
+
+    capped: Union[bool, None] = None
+    """Closes both ends of a part with flat discs, so that the mesh is a solid. A height map has no ends. Default: false."""
+
+    colour_range_um: Union[float, None] = None
+    """Deviation of the two strongest colours, ± µm; without it the largest deviation."""
+
+    magnification: Union[float, None] = None
+    """Also writes a second file beside it, `NAME-x1000` for 1000, with the deviations from the nominal radius, or the heights of a
+    map, drawn so many times larger. Above 1, at most 1000000."""
+
+    path: str
+    """The file to write; the mesh in it is at true scale."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
 class Figures:
     """Figures of a result as SVG and PNG"""
 

@@ -9,7 +9,7 @@ use crate::{
 };
 
 /// Modules, and the packages that bring them.
-const PYTHON_PACKAGES: [[&str; 2]; 11] = [
+const PYTHON_PACKAGES: [[&str; 2]; 13] = [
     ["numpy"; 2],
     ["scipy"; 2],
     ["h5py"; 2],
@@ -18,6 +18,9 @@ const PYTHON_PACKAGES: [[&str; 2]; 11] = [
     ["duckdb"; 2],
     ["openpyxl"; 2],
     ["trimesh"; 2],
+    // With these trimesh reads 3MF.
+    ["lxml"; 2],
+    ["networkx"; 2],
     ["pymeshlab"; 2],
     ["sklearn", "scikit-learn"],
     ["pykrige"; 2],

@@ -157,6 +157,9 @@ fn table(exporter: &str, folder: &str) -> String {
         "report" => "/report.html",
         "gltf" => "/part.glb",
         "obj" => "/part.obj",
+        "ply" => "/part.ply",
+        "stl" => "/part.stl",
+        "3mf" => "/part.3mf",
         "x3p" => "/part.x3p",
         "sdf" => "/part.sdf",
         "csv" => "/values.csv",
@@ -203,7 +206,7 @@ fn every_exporter_writes_every_domain_or_is_refused_in_words() {
                 Ok(_) => tables.push_str(&table(exporter, "out")),
                 Err(error) => {
                     let ConfigError::Text(diagnostic) = error else { panic!("{name}, {exporter}: {error}") };
-                    let is_surface = ["gltf", "obj", "x3p", "sdf"].contains(exporter);
+                    let is_surface = ["gltf", "obj", "ply", "stl", "3mf", "x3p", "sdf"].contains(exporter);
                     assert!(is_surface && !has_surface, "{name}, {exporter}: {diagnostic}");
                     assert!(diagnostic.message.contains("form along an axis or a height map"), "{name}: {diagnostic}");
                     assert!(diagnostic.help.is_some(), "{name}, {exporter}");
