@@ -45,6 +45,8 @@ pub(crate) enum Command {
     Schema(SchemaArgs),
     /// Say what a file holds (HDF5, Parquet, CSV, X3P, SDF, SUR).
     Inspect(InspectArgs),
+    /// Write a pipeline to start from, for a method and, where it is given, a file.
+    New(NewArgs),
     /// Write a height map or a profile in another format (X3P, SDF, HDF5).
     Convert(ConvertArgs),
     /// Print the completion script of a shell.
@@ -283,6 +285,21 @@ pub(crate) struct SchemaArgs {
 pub(crate) struct InspectArgs {
     /// A measurement, a result or a table.
     pub file: PathBuf,
+}
+
+/// `runout new`.
+#[derive(Debug, Args)]
+pub(crate) struct NewArgs {
+    /// The method: a plugin of [separate], as `docs/methods.md` and `runout plugins` list them.
+    pub method: String,
+    /// The recording, points or map that is to be read: [load] is written for it.
+    pub file: Option<PathBuf>,
+    /// The pipeline to write; METHOD.toml without it.
+    #[arg(long, value_name = "PIPELINE.toml")]
+    pub out: Option<PathBuf>,
+    /// Write over a pipeline that is there.
+    #[arg(long)]
+    pub overwrite: bool,
 }
 
 /// `runout convert`.

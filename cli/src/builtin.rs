@@ -26,8 +26,12 @@ pub fn registry() -> Registry {
         runout_parquet::register,
         runout_gltf::register,
         runout_obj::register,
+        runout_ply::register,
+        runout_stl::register,
+        runout_3mf::register,
         runout_figures::register,
         runout_report::register,
+        runout_values::register,
     ] {
         register(&mut registry);
     }

@@ -18,6 +18,7 @@ mod failure;
 mod progress;
 mod render;
 mod reports;
+mod templates;
 
 use std::{
     ffi::OsString,

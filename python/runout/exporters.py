@@ -92,6 +92,66 @@ class Obj:
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
+class Ply:
+    """Writes the surface as a PLY mesh in mm, with colour and the deviation as quality"""
+
+    plugin: ClassVar[str] = "ply"
+
+    capped: Union[bool, None] = None
+    """Closes both ends of a part with flat discs, so that the mesh is a solid. A height map has no ends. Default: false."""
+
+    colour_range_um: Union[float, None] = None
+    """Deviation of the two strongest colours, ± µm; without it the largest deviation."""
+
+    magnification: Union[float, None] = None
+    """Also writes a second file beside it, `NAME-x1000` for 1000, with the deviations from the nominal radius, or the heights of a
+    map, drawn so many times larger. Above 1, at most 1000000."""
+
+    path: str
+    """The file to write; the mesh in it is at true scale."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Stl:
+    """Writes the surface as a binary STL mesh in mm, without colours"""
+
+    plugin: ClassVar[str] = "stl"
+
+    capped: Union[bool, None] = None
+    """Closes both ends of a part with flat discs, so that the mesh is a solid. A height map has no ends. Default: false."""
+
+    colour_range_um: Union[float, None] = None
+    """Deviation of the two strongest colours, ± µm; without it the largest deviation."""
+
+    magnification: Union[float, None] = None
+    """Also writes a second file beside it, `NAME-x1000` for 1000, with the deviations from the nominal radius, or the heights of a
+    map, drawn so many times larger. Above 1, at most 1000000."""
+
+    path: str
+    """The file to write; the mesh in it is at true scale."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Format3mf:
+    """Writes the surface as a 3MF mesh in mm, coloured by deviation, for printing"""
+
+    plugin: ClassVar[str] = "3mf"
+
+    capped: Union[bool, None] = None
+    """Closes both ends of a part with flat discs, so that the mesh is a solid. A height map has no ends. Default: false."""
+
+    colour_range_um: Union[float, None] = None
+    """Deviation of the two strongest colours, ± µm; without it the largest deviation."""
+
+    magnification: Union[float, None] = None
+    """Also writes a second file beside it, `NAME-x1000` for 1000, with the deviations from the nominal radius, or the heights of a
+    map, drawn so many times larger. Above 1, at most 1000000."""
+
+    path: str
+    """The file to write; the mesh in it is at true scale."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
 class Figures:
     """Figures of a result as SVG and PNG"""
 
@@ -115,3 +175,51 @@ class Report:
 
     path: str
     """The file to write, relative to the TOML: `out/report.html`."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Csv:
+    """Values with their uncertainties, limits and decisions as CSV, one row each"""
+
+    plugin: ClassVar[str] = "csv"
+
+    decimal_comma: Union[bool, None] = None
+    """Decimal commas, and semicolons between cells, as spreadsheets of many countries expect. Default: false."""
+
+    path: str
+    """The file to write, ending in `.csv`: one row a value and limit."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Xlsx:
+    """Values with limits as an Excel workbook, coloured by decision, and a sheet a table that is asked for"""
+
+    plugin: ClassVar[str] = "xlsx"
+
+    path: str
+    """The file to write, ending in `.xlsx`. Its first sheet has the values."""
+
+    tables: Union[Sequence[str], None] = None
+    """Tables of the result that have a sheet too, by their names: `["form", "harmonics"]`."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class QDas:
+    """Values with their limits in the Q-DAS ASCII transfer format (.dfq)"""
+
+    plugin: ClassVar[str] = "q-das"
+
+    only_limited: Union[bool, None] = None
+    """Only values that a limit names; with `false` all values. Default: true."""
+
+    part: Union[str, None] = None
+    """Description of the part (K1002); the pipeline's title without it."""
+
+    part_number: Union[str, None] = None
+    """Number of the part (K1001)."""
+
+    path: str
+    """The file to write, ending in `.dfq`: one characteristic a value and limit."""
+
+    time: Union[str, None] = None
+    """When it was measured (K0004), as `28.11.2026/14:30:00`."""

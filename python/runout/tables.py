@@ -99,10 +99,10 @@ class Evaluate:
     texture: Union[Mapping[str, Any], None] = None
     """What texture values are of, besides λs and λc."""
 
-    values: Union[Union[Literal['all'], Sequence[Union[Literal['roundness'], Literal['harmonics'], Literal['straightness'], Literal['texture'], Literal['cylindricity'], Literal['areal'], Literal['twist'], Literal['error-motion']]]], None] = None
+    values: Union[Union[Literal['all'], Sequence[Union[Literal['roundness'], Literal['harmonics'], Literal['straightness'], Literal['texture'], Literal['cylindricity'], Literal['areal'], Literal['twist'], Literal['error-motion'], Literal['run-out']]]], None] = None
     """Groups of values, or "all"; without it `roundness`, `straightness`, `texture`, `cylindricity` and `error-motion`, as far as
-    what the separator offers gives them. Of "all", what a run cannot give (areal values and twist of a single section) is left
-    out."""
+    what the separator offers gives them; `run-out` where nothing is separated. Of "all", what a run cannot give (areal values
+    and twist of a single section) is left out."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

@@ -1,4 +1,4 @@
-//! Readers that others wrote, for tests of our files: h5py, pyarrow, trimesh, MeshLab, the Khronos glTF validator, and Chromium with
+//! Readers that others wrote, for tests of our files: h5py, pyarrow, openpyxl, trimesh, MeshLab, the Khronos glTF validator, and Chromium with
 //! the accessibility checks of axe.
 
 use std::{path::PathBuf, process::Command};
@@ -9,14 +9,18 @@ use crate::{
 };
 
 /// Modules, and the packages that bring them.
-const PYTHON_PACKAGES: [[&str; 2]; 10] = [
+const PYTHON_PACKAGES: [[&str; 2]; 13] = [
     ["numpy"; 2],
     ["scipy"; 2],
     ["h5py"; 2],
     ["pyarrow"; 2],
     ["polars"; 2],
     ["duckdb"; 2],
+    ["openpyxl"; 2],
     ["trimesh"; 2],
+    // With these trimesh reads 3MF.
+    ["lxml"; 2],
+    ["networkx"; 2],
     ["pymeshlab"; 2],
     ["sklearn", "scikit-learn"],
     ["pykrige"; 2],

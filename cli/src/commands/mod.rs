@@ -7,6 +7,7 @@ pub(crate) mod completions;
 pub(crate) mod convert;
 pub(crate) mod diagnose;
 pub(crate) mod inspect;
+pub(crate) mod new;
 pub(crate) mod plan;
 pub(crate) mod plugins;
 pub(crate) mod report;
@@ -39,6 +40,7 @@ pub(crate) fn execute(command: Command, json: bool, registry: &Registry) -> Resu
         Command::Plugins(args) => plugins::execute(&args, json, registry),
         Command::Schema(args) => schema::execute(&args, json, registry),
         Command::Inspect(args) => inspect::execute(&args, json),
+        Command::New(args) => new::execute(&args, json, registry),
         Command::Convert(args) => convert::execute(&args, json),
         Command::Report(args) => report::execute(&args, json),
         Command::Completions(args) => completions::execute(&args, json),

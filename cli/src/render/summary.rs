@@ -41,6 +41,8 @@ pub(crate) fn text(summary: &Summary, width: usize, verbose: bool) -> String {
             separated(&mut page, summary);
         } else {
             reading::section(&mut page, stations);
+            reading::values(&mut page, stations);
+            values::limits(&mut page, summary);
         }
         lost_orders(&mut page, summary);
         page.detail("surface", |page| surface(page, summary));
@@ -77,6 +79,7 @@ fn by_station(page: &mut Page, summary: &Summary) {
         page.line(format_args!("  {STARRED} lacks the same lost orders"));
     }
     motion::section(page, stations);
+    reading::values(page, stations);
     values::part(page, summary);
 }
 
@@ -200,7 +203,7 @@ fn with_uncertainty(value: &Value) -> String {
 }
 
 fn form_heading(stations: &[StationSummary]) -> String {
-    let band = sections(stations).find_map(|(_, section)| section.values.first()).map(|value| value.band_upr);
+    let band = sections(stations).find_map(|(_, section)| of_form(section)).map(|value| value.band_upr);
     let band = band.map(|[low, high]| format!(", {low} to {high} undulations per revolution")).unwrap_or_default();
     format!("Form{band}")
 }
@@ -242,7 +245,12 @@ fn form_by_station(stations: &[StationSummary]) -> Table {
 
 /// Orders that a section's form lacks, as its unfiltered values say.
 fn lost_in(section: &SectionSummary) -> &[usize] {
-    section.values.first().map_or(&[], |value| &value.lost_orders)
+    of_form(section).map_or(&[], |value| &value.lost_orders)
+}
+
+/// The first value of the whole form: not one of a single order, nor of a reading.
+fn of_form(section: &SectionSummary) -> Option<&Value> {
+    section.values.iter().find(|value| SHOWN.contains(&&*value.symbol))
 }
 
 fn star(lost: &[usize]) -> &'static str {

@@ -157,8 +157,14 @@ fn table(exporter: &str, folder: &str) -> String {
         "report" => "/report.html",
         "gltf" => "/part.glb",
         "obj" => "/part.obj",
+        "ply" => "/part.ply",
+        "stl" => "/part.stl",
+        "3mf" => "/part.3mf",
         "x3p" => "/part.x3p",
         "sdf" => "/part.sdf",
+        "csv" => "/values.csv",
+        "xlsx" => "/values.xlsx",
+        "q-das" => "/values.dfq",
         _ => "",
     };
     format!("[[export]]\nplugin = '{exporter}'\npath = '{folder}{file}'\n")
@@ -200,7 +206,7 @@ fn every_exporter_writes_every_domain_or_is_refused_in_words() {
                 Ok(_) => tables.push_str(&table(exporter, "out")),
                 Err(error) => {
                     let ConfigError::Text(diagnostic) = error else { panic!("{name}, {exporter}: {error}") };
-                    let is_surface = ["gltf", "obj", "x3p", "sdf"].contains(exporter);
+                    let is_surface = ["gltf", "obj", "ply", "stl", "3mf", "x3p", "sdf"].contains(exporter);
                     assert!(is_surface && !has_surface, "{name}, {exporter}: {diagnostic}");
                     assert!(diagnostic.message.contains("form along an axis or a height map"), "{name}: {diagnostic}");
                     assert!(diagnostic.help.is_some(), "{name}, {exporter}");
@@ -212,7 +218,10 @@ fn every_exporter_writes_every_domain_or_is_refused_in_words() {
             pipeline(path, &format!("{text}{tables}"), &registry).unwrap_or_else(|error| panic!("{name}: {error}"));
         let summary = all.run().unwrap_or_else(|error| panic!("{name}: {error}"));
         assert_eq!(tables.contains("gltf"), has_surface, "{name}");
-        for ending in ["parquet", "h5", "html", "svg", "png", "json"].into_iter().chain(has_surface.then_some("glb")) {
+        for ending in ["parquet", "h5", "html", "svg", "png", "json", "csv", "xlsx"]
+            .into_iter()
+            .chain(has_surface.then_some("glb"))
+        {
             let file = summary.outputs.iter().find(|path| path.extension().is_some_and(|found| found == ending));
             let file = file.unwrap_or_else(|| panic!("{name}: no {ending} in {:?}", summary.outputs));
             assert!(fs::metadata(file).unwrap().len() > 100, "{name}: {}", file.display());

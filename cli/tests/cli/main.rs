@@ -13,6 +13,7 @@ mod folder;
 mod lost_orders;
 mod maps;
 mod measured;
+mod new;
 mod odd_files;
 mod one_line;
 mod other_rigs;

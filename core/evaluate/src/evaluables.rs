@@ -99,6 +99,7 @@ impl Group {
             Self::Texture => &[EvaluableKind::ClosedProfiles, EvaluableKind::OpenProfile],
             Self::Areal => &[EvaluableKind::ClosedProfiles, EvaluableKind::HeightMap],
             Self::ErrorMotion => &[EvaluableKind::AxisMotion],
+            Self::RunOut => &[EvaluableKind::TurnSpread],
         }
     }
 

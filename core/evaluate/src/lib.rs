@@ -20,6 +20,7 @@ mod part;
 mod plane_map;
 mod positions;
 mod roundness;
+mod run_out;
 mod section;
 mod section_gaps;
 mod station;

@@ -1,12 +1,13 @@
 //! One station with all of its values, finished in one place.
 
 use crate::{
-    Evaluate, Value,
+    Evaluate, Group, Value,
     error_motion::{Centre, ErrorMotion, behind_low_pass, with_jitter_of_marks},
+    run_out,
     section::{missing_circles, section_values, steepest_um_per_deg},
 };
 use runout_consistency::refuted_by;
-use runout_turning::{rig::Rig, separation::Quantity, station::StationResult};
+use runout_turning::{reading::ReadingValues, rig::Rig, separation::Quantity, station::StationResult};
 
 /// What was separated, and the standards' values of it.
 #[derive(Debug, Clone, PartialEq)]
@@ -17,6 +18,8 @@ pub struct EvaluatedStation {
     pub values: Vec<Vec<Value>>,
     /// Error motion values of the axis; empty where no spread over the turns is known.
     pub motion_values: Vec<Value>,
+    /// What readings have by themselves: where nothing is separated, or run-out is asked for.
+    pub readings: Vec<ReadingValues>,
 }
 
 impl EvaluatedStation {
@@ -48,7 +51,18 @@ impl EvaluatedStation {
             let all = values.iter_mut().flatten().chain(&mut motion_values);
             all.for_each(|value| value.refuted_by = Some(by.clone()));
         }
-        Self { result, values, motion_values }
+        let asked = evaluate.has(Group::RunOut) || result.separation.has_no_observable_form();
+        let readings = if asked { ReadingValues::of_all(&result.profiles, rig) } else { Vec::new() };
+        if let Some(rig) = rig.filter(|_| evaluate.has(Group::RunOut)) {
+            // What is separated may be refuted; readings are what was measured.
+            for (at, values) in result.separation.sections.iter().zip(&mut values) {
+                let section = rig.sections.iter().position(|id| *id == at.id);
+                values.extend(
+                    section.into_iter().flat_map(|section| run_out::values(&result.profiles, &readings, rig, section)),
+                );
+            }
+        }
+        Self { result, values, motion_values, readings }
     }
 
     /// The first RONt of a section.

@@ -1,5 +1,8 @@
 //! What a run found, for people and programs.
 
+mod reported;
+
+pub use reported::ReportedValue;
 pub use runout_evaluate::{Decision, Limit, LimitSummary, LimitValue, NamedValue, PartSummary, PlacedValue, Value};
 
 use std::{collections::BTreeMap, path::PathBuf};

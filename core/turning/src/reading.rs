@@ -6,8 +6,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::profile::Profile;
-use runout_draws::{Draws, Measured, seed};
+use crate::{profile::Profile, rig::Rig};
+use runout_draws::{Draws, Measured, Uncertainty, seed};
 use runout_numerics::{Complex64, fourier::Fourier};
 use runout_standards::roundness::ront_lsci_um;
 
@@ -30,6 +30,9 @@ pub struct ReadingValues {
     pub tir_um: f64,
     /// Its standard uncertainty, from the scatter of the turns; null below two turns.
     pub tir_std_um: Option<f64>,
+    /// The same with the 95 % interval.
+    #[serde(default)]
+    pub tir_uncertainty: Option<Uncertainty>,
     /// Once per revolution: eccentricity of the part and motion of the axis.
     pub once_per_rev: ReadingHarmonic,
     /// Orders from 2 to 15, as far as the average holds them.
@@ -66,6 +69,19 @@ impl ReadingHarmonic {
 }
 
 impl ReadingValues {
+    /// Of every channel of every capture.
+    #[must_use]
+    pub fn of_all(profiles: &[Profile], rig: Option<&Rig>) -> Vec<Self> {
+        let of = |profile: &Profile| -> Vec<Self> {
+            let setup = setup_id(profile, rig);
+            let channels = profile.sensors.iter().enumerate();
+            channels
+                .filter_map(|(channel, sensor)| Self::of(profile, channel, &setup, &sensor_id(*sensor, rig)))
+                .collect()
+        };
+        profiles.iter().flat_map(of).collect()
+    }
+
     /// Of one channel of a profile. Nothing where the average holds no order 1.
     #[must_use]
     pub fn of(profile: &Profile, channel: usize, setup: &str, sensor: &str) -> Option<Self> {
@@ -85,18 +101,32 @@ impl ReadingValues {
             (turns as f64 * (level + 0.5 * scatter.iter().skip(1).sum::<f64>())).sqrt()
         });
         let squares = 2 * turns.saturating_sub(1);
-        let (tir_um, tir_std_um) = run_out(&mean, variance.clone(), squares, seed(&[&profile.object, setup, sensor]));
+        let (tir_um, tir_uncertainty) =
+            run_out(&mean, variance.clone(), squares, seed(&[&profile.object, setup, sensor]));
         Some(Self {
             setup: setup.to_owned(),
             sensor: sensor.to_owned(),
             turns,
             tir_um,
-            tir_std_um,
+            tir_std_um: tir_uncertainty.as_ref().map(|known| known.std),
+            tir_uncertainty,
             once_per_rev,
             harmonics: (2..=LISTED).map_while(of).collect(),
             turns_std_um,
         })
     }
+}
+
+/// Id of the setup of a capture.
+#[must_use]
+pub fn setup_id(profile: &Profile, rig: Option<&Rig>) -> String {
+    rig.and_then(|rig| rig.setups.get(profile.setup)).map_or_else(String::new, |setup| setup.id.clone())
+}
+
+/// Id of a sensor, by its index in the rig.
+#[must_use]
+pub fn sensor_id(index: usize, rig: Option<&Rig>) -> String {
+    rig.and_then(|rig| rig.sensors.get(index)).map_or_else(|| format!("sensor {index}"), |sensor| sensor.id.clone())
 }
 
 /// Coefficients of one channel of the mean, by order from 0.
@@ -123,8 +153,8 @@ fn diagonal(matrices: &[Complex64], channels: usize, channel: usize) -> Vec<f64>
     own.map(|entry| entry.re.max(0.0)).collect()
 }
 
-/// Peak-to-valley of Re Σ cₙ e^{−inΦ} over the turn without its level, with its standard uncertainty; variances are known from so many squares.
-fn run_out(mean: &[Complex64], variance: Option<Vec<f64>>, squares: usize, seed: u64) -> (f64, Option<f64>) {
+/// Peak-to-valley of Re Σ cₙ e^{−inΦ} over the turn without its level, with its uncertainty; variances are known from so many squares.
+fn run_out(mean: &[Complex64], variance: Option<Vec<f64>>, squares: usize, seed: u64) -> (f64, Option<Uncertainty>) {
     let points = (POINTS_A_WAVE * mean.len()).next_power_of_two();
     let harmonics: Vec<Complex64> =
         mean.iter().enumerate().map(|(order, value)| if order == 0 { Complex64::ZERO } else { value.conj() }).collect();
@@ -137,7 +167,7 @@ fn run_out(mean: &[Complex64], variance: Option<Vec<f64>>, squares: usize, seed:
         let profiles = draws.profiles(|_| Complex64::ONE, points, |_, _| ());
         profiles.values_of_section(|turn, found| found.push(ront_lsci_um(turn))).pop()?.uncertainty
     });
-    (tir_um, known.map(|known| known.std))
+    (tir_um, known)
 }
 
 #[cfg(test)]

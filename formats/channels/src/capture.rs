@@ -252,7 +252,11 @@ impl Place<'_> {
                 && (one / other - 1.0).abs() > SAME_RATE
             {
                 let problem = format!("its sampling rate is {other} Hz, that of {} {one} Hz", first.shown);
-                return Err(signal.error(problem).help("record all sensors at one rate, or resample the slower ones"));
+                let half_hz = 0.5 * one.min(other);
+                return Err(signal.error(problem).help(format!(
+                    "the slower one holds nothing above {half_hz} Hz, where what is separated would be wrong: record all sensors at one rate, \
+                     or bring the faster ones to the lower rate, behind a low-pass"
+                )));
             }
         }
         let found = match first.channel().rate_hz {

@@ -32,7 +32,7 @@ pub use channel::{Channel, ChannelFile, Kind, Samples};
 pub use config::{AngleConfig, ChannelConfig, ChannelsConfig, ConvertedConfig, MarkConfig};
 pub use formats::{FORMATS, Format, format_of, open};
 use runout_core::pipeline::{Plugin, Registry};
-pub use suggest::{ChannelReport, ChannelsReport, inspect};
+pub use suggest::{ChannelReport, ChannelsReport, Suggestion, inspect};
 
 /// Adds the loader `channels`.
 pub fn register(registry: &mut Registry) {

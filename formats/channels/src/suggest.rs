@@ -1,6 +1,11 @@
 //! What a file holds, and a `[load]` table to start from.
 
-use std::{collections::BTreeMap, fmt::Write as _, path::Path, sync::Arc};
+use std::{
+    collections::BTreeMap,
+    fmt::{self, Write as _},
+    path::Path,
+    sync::Arc,
+};
 
 use runout_core::{Result, input_file::InputFile};
 use serde::Serialize;
@@ -37,6 +42,9 @@ pub struct ChannelsReport {
     pub mark: Option<String>,
     /// A `[load]` table to start from.
     pub load: String,
+    /// The same, part by part.
+    #[serde(skip)]
+    pub suggestion: Suggestion,
     /// What a reader should know of the file.
     pub remarks: Vec<String>,
 }
@@ -56,6 +64,64 @@ pub struct ChannelReport {
 enum Turning {
     Pulses { threshold: f64, hysteresis: f64 },
     Angle,
+}
+
+/// A `[load]` table to start from.
+#[derive(Debug, Clone, Default, PartialEq)]
+#[non_exhaustive]
+pub struct Suggestion {
+    /// The file, as the table names it.
+    pub path: String,
+    /// Setups with their groups; empty where the file has no groups that are alike.
+    pub setups: Vec<[String; 2]>,
+    /// Sensors with their channels.
+    pub channels: Vec<[String; 2]>,
+    /// The lines behind: mark, unit, rate.
+    pub rest: String,
+}
+
+impl Suggestion {
+    /// The same for a rig's own setups and sensors, in their order; what the rig has no name for is a comment.
+    #[must_use]
+    pub fn for_rig(mut self, setups: &[&str], sensors: &[&str]) -> Self {
+        let mut comments = String::new();
+        if self.setups.is_empty() && setups.len() > 1 {
+            comments.push_str("# with a file for each setup of the rig: pattern = \"{setup}.…\" in place of path\n");
+        }
+        for (what, entries, names) in [("groups", &mut self.setups, setups), ("channels", &mut self.channels, sensors)]
+        {
+            let more: Vec<String> = entries.iter().skip(names.len()).map(|[_, name]| quoted(name)).collect();
+            if !more.is_empty() {
+                let _ = writeln!(comments, "# {what} of the file that the rig does not have: {}", more.join(", "));
+            }
+            if !entries.is_empty() && entries.len() < names.len() {
+                let _ = writeln!(
+                    comments,
+                    "# the rig has more than the {} {what} that were found in the file",
+                    entries.len()
+                );
+            }
+            entries.truncate(names.len());
+            entries.iter_mut().zip(names).for_each(|(entry, name)| (*name).clone_into(&mut entry[0]));
+        }
+        self.rest.push_str(&comments);
+        self
+    }
+}
+
+impl fmt::Display for Suggestion {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let entries = |entries: &[[String; 2]]| {
+            let entry = |[name, of]: &[String; 2]| format!("{} = {}", key(name), quoted(of));
+            entries.iter().map(entry).collect::<Vec<_>>().join(", ")
+        };
+        writeln!(f, "[load]\nplugin = \"channels\"\npath = {}", quoted(&self.path))?;
+        if !self.setups.is_empty() {
+            writeln!(f, "setups = {{ {} }}", entries(&self.setups))?;
+        }
+        writeln!(f, "channels = {{ {} }}", entries(&self.channels))?;
+        f.write_str(&self.rest)
+    }
 }
 
 /// Looks into a file; nothing where it is of none of the formats.
@@ -81,9 +147,10 @@ pub fn inspect(path: &Path) -> Result<Option<ChannelsReport>> {
     }
     let mark = best_mark(file.channels(), &turning);
     let name = path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
-    let load = table(&name, file.channels(), mark.map(|(index, turning)| (&file.channels()[index], turning)));
+    let suggestion = table(&name, file.channels(), mark.map(|(index, turning)| (&file.channels()[index], turning)));
     let mark = mark.map(|(index, _)| file.channels()[index].path());
-    Ok(Some(ChannelsReport { format: format.name, channels, mark, load, remarks: file.remarks() }))
+    let (load, remarks) = (suggestion.to_string(), file.remarks());
+    Ok(Some(ChannelsReport { format: format.name, channels, mark, load, suggestion, remarks }))
 }
 
 fn beginning(file: &dyn ChannelFile, index: usize, wanted: usize) -> Result<Vec<f64>> {
@@ -148,8 +215,8 @@ fn rounded(value: f64) -> f64 {
 }
 
 /// The table for the file.
-fn table(file: &str, channels: &[Channel], mark: Option<(&Channel, Turning)>) -> String {
-    let mut text = format!("[load]\nplugin = \"channels\"\npath = {}\n", quoted(file));
+fn table(file: &str, channels: &[Channel], mark: Option<(&Channel, Turning)>) -> Suggestion {
+    let mut text = String::new();
     let is_signal = |channel: &Channel| channel.kind.is_number() && channel.samples > 1 && !is_time(channel);
     // Where groups have one channel each, of one name, the groups are the channels.
     let mut signals = channels.iter().filter(|channel| is_signal(channel));
@@ -174,27 +241,21 @@ fn table(file: &str, channels: &[Channel], mark: Option<(&Channel, Turning)>) ->
     let names = groups.get(first).cloned().unwrap_or_default();
     let alike: Vec<&str> = order.iter().copied().filter(|group| groups.get(group) == Some(&names)).collect();
     let has_setups = alike.len() > 1 && !by_group;
-    if has_setups {
-        let id = |number: usize| {
-            SETUPS
-                .get(number)
-                .filter(|_| alike.len() == 2)
-                .map_or_else(|| format!("setup-{}", number + 1), |id| (*id).to_owned())
-        };
-        let entries: Vec<String> = alike
-            .iter()
-            .enumerate()
-            .map(|(number, group)| format!("{} = {}", key(&id(number)), quoted(group)))
-            .collect();
-        let _ = writeln!(text, "setups = {{ {} }}", entries.join(", "));
-    }
+    let id = |number: usize| {
+        SETUPS
+            .get(number)
+            .filter(|_| alike.len() == 2)
+            .map_or_else(|| format!("setup-{}", number + 1), |id| (*id).to_owned())
+    };
+    let alike_groups = alike.iter().enumerate().filter(|_| has_setups);
+    let setups = alike_groups.map(|(number, group)| [id(number), (*group).to_owned()]).collect();
     let is_unique = |name: &str| channels.iter().filter(|channel| channel.name == name).count() == 1;
     let path = |channel: &Channel| {
         if has_setups || is_unique(&channel.name) { channel.name.clone() } else { channel.path() }
     };
     let chosen: Vec<&Channel> = sensors.iter().copied().filter(|channel| by_group || channel.group == first).collect();
-    let entry = |(number, channel): (usize, &&Channel)| format!("S{} = {}", number + 1, quoted(&path(channel)));
-    let _ = writeln!(text, "channels = {{ {} }}", chosen.iter().enumerate().map(entry).collect::<Vec<_>>().join(", "));
+    let entry = |(number, channel): (usize, &&Channel)| [format!("S{}", number + 1), path(channel)];
+    let sensors = chosen.iter().enumerate().map(entry).collect();
     match mark {
         Some((mark, Turning::Angle)) => {
             let unit = mark.unit.clone().filter(|unit| unit::known(unit).is_some()).unwrap_or_else(|| "deg".into());
@@ -220,7 +281,7 @@ fn table(file: &str, channels: &[Channel], mark: Option<(&Channel, Turning)>) ->
     if !has_time && chosen.iter().any(|channel| channel.rate_hz.is_none()) {
         text.push_str("# the file has no sampling rate; write yours\n# sample_rate_hz = 5120\n");
     }
-    text
+    Suggestion { path: file.to_owned(), setups, channels: sensors, rest: text }
 }
 
 /// A key of TOML.

@@ -24,6 +24,14 @@ pub(crate) fn all_assets() -> Vec<PathBuf> {
     files
 }
 
+/// One campaign in every format, with a mark.
+pub(crate) fn campaign() -> Vec<PathBuf> {
+    let mut files: Vec<PathBuf> =
+        fs::read_dir(assets().join("campaign")).unwrap().map(|entry| entry.unwrap().path()).collect();
+    files.sort();
+    files
+}
+
 pub(crate) fn opened(path: &Path) -> Result<Box<dyn ChannelFile>> {
     open(&InputFile::new(path)?, None)
 }

@@ -237,6 +237,7 @@ fn sensors_of_unlike_rates_are_refused_with_words() {
     let load = "pattern = \"{channel}.csv\"\nchannel_path = \"v\"\nmarker = { channel = \"S1\" }";
     let found = opened(&files, load, &rig(&["only"], Unit::Micrometre)).map(|_| ()).unwrap_err();
     assert!(found.to_string().contains("sampling rate is 500"), "{found}");
+    assert!(found.advice().unwrap().contains("nothing above 250 Hz"), "{found}");
     let files = [("S1.csv", csv(1000.0, 0.0, &[("v", &s1)], 500)), ("S2.csv", csv(1000.0, 0.0004, &[("v", &s2)], 500))];
     let found = opened(&files, load, &rig(&["only"], Unit::Micrometre)).map(|_| ()).unwrap_err();
     assert!(found.to_string().contains("0.400 samples later"), "{found}");

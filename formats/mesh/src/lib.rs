@@ -18,6 +18,7 @@ mod portions;
 mod sheet;
 mod vertices;
 mod wall;
+mod whole;
 
 pub use cap::Cap;
 pub use colour::{ColourScale, STEPS as COLOUR_STEPS, UNMEASURED, linear, palette};
@@ -29,3 +30,4 @@ pub use portions::{in_order, processors};
 pub use sheet::Sheet;
 pub use vertices::{LANES, Vertices};
 pub use wall::Wall;
+pub use whole::Vertex;

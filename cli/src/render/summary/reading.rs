@@ -2,7 +2,7 @@
 
 use runout_core::{reading::ReadingValues, summary::StationSummary};
 
-use super::FEW_STATIONS;
+use super::{FEW_STATIONS, sections, unit, with_uncertainty};
 use crate::render::{
     number::{significant, with_std},
     page::Page,
@@ -36,6 +36,27 @@ pub(crate) fn section(page: &mut Page, stations: &[StationSummary]) {
     }
     page.line("  1/rev is the amplitude, highest at that spindle angle; turns ± is the standard deviation of single turns at one angle;");
     page.line("  harmonics are the largest amplitudes from order 2, behind their order");
+}
+
+/// Symbols of what readings have by themselves.
+const OF_READINGS: [&str; 3] = ["TIR", "eccentricity", "eccentricity-angle"];
+
+/// Run-out and eccentricity of each section in each setup, of the first stations.
+pub(crate) fn values(page: &mut Page, stations: &[StationSummary]) {
+    let mut table = Table::new(3, ["station", "section", "value", "of", "number ± std", "unit"]);
+    for (station, section) in sections(&stations[..stations.len().min(FEW_STATIONS)]) {
+        for value in section.values.iter().filter(|value| OF_READINGS.contains(&&*value.symbol)) {
+            table.row([
+                if stations.len() > 1 { station.station.clone() } else { String::new() },
+                section.section.clone(),
+                value.symbol.clone(),
+                value.reference.clone(),
+                with_uncertainty(value),
+                unit(&value.unit),
+            ]);
+        }
+    }
+    page.headed_table("Run-out and eccentricity", &table);
 }
 
 fn harmonics(reading: &ReadingValues) -> String {

@@ -28,11 +28,13 @@ pub enum Group {
     Twist,
     /// ISO 230-7, of each station; of an axis at standing positions its synchronous values.
     ErrorMotion,
+    /// TIR of each averaged reading; size and part angle of the eccentricity of each section in each setup.
+    RunOut,
 }
 
 impl Group {
     /// All of them.
-    pub(super) const ALL: [Self; 8] = [
+    pub(super) const ALL: [Self; 9] = [
         Self::Roundness,
         Self::Harmonics,
         Self::Straightness,
@@ -41,6 +43,7 @@ impl Group {
         Self::Areal,
         Self::Twist,
         Self::ErrorMotion,
+        Self::RunOut,
     ];
 
     /// Its name in a file.
@@ -54,6 +57,7 @@ impl Group {
             Self::Areal => "areal",
             Self::Twist => "twist",
             Self::ErrorMotion => "error-motion",
+            Self::RunOut => "run-out",
         }
     }
 }

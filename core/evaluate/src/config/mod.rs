@@ -37,7 +37,7 @@ use runout_turning::{
 #[non_exhaustive]
 pub struct EvaluateConfig {
     /// Groups of values, or "all"; without it `roundness`, `straightness`, `texture`, `cylindricity` and `error-motion`, as far as what
-    /// the separator offers gives them. Of "all", what a run cannot give (areal values and twist of a single section) is left out.
+    /// the separator offers gives them; `run-out` where nothing is separated. Of "all", what a run cannot give (areal values and twist of a single section) is left out.
     #[schemars(with = "Option<GroupsSchema>")]
     pub values: Option<Groups>,
     /// Reference circles of roundness; those of cylindricity follow them (LSCY, MZCY, MICY, MCCY), and the lines of straightness those
@@ -186,6 +186,11 @@ impl Evaluate {
     /// Adds areal values, which are asked for by name otherwise.
     pub fn add_areal(&mut self) {
         self.groups.push(Group::Areal);
+    }
+
+    /// Adds values of the readings, which are asked for by name where something is separated.
+    pub fn add_run_out(&mut self) {
+        self.groups.push(Group::RunOut);
     }
 
     /// Leaves only what is computed from these.

@@ -64,6 +64,12 @@ impl Evaluate {
                 symbols.extend(["eccentricity", "circular-run-out", "total-run-out"].map(|symbol| (symbol, "µm")));
             }
         }
+        if self.has(Group::RunOut) {
+            symbols.extend([("TIR", "µm"), ("eccentricity-angle", "°")]);
+            if !self.has(Group::Cylindricity) || self.datum.is_empty() {
+                symbols.push(("eccentricity", "µm"));
+            }
+        }
         if self.has(Group::Areal) {
             symbols.extend(areal::PARAMETERS.iter().map(|(symbol, unit, _)| (*symbol, *unit)));
             symbols.extend([("Smr(c)", "%"), ("Smc(p)", "µm")]);

@@ -190,7 +190,7 @@ impl Pipeline {
             .iter()
             .map(|table| registry.checks.build(table, &context))
             .collect::<Result<_, _>>()?;
-        let evaluate = evaluate(root, &route, rig.as_ref())?;
+        let evaluate = evaluate(root, &route, rig.as_ref(), assessment.as_ref())?;
         let of_result = route.tables(assessment.as_ref(), rig.as_ref());
         let exporting = Exporting {
             registry,
@@ -296,7 +296,12 @@ fn named_files(root: &Table, folder: &Path) -> Vec<PathBuf> {
 }
 
 /// What is evaluated of a result, and the limits of it.
-fn evaluate(root: &Table, route: &Route, rig: Option<&Rig>) -> Result<Evaluate, Fault> {
+fn evaluate(
+    root: &Table,
+    route: &Route,
+    rig: Option<&Rig>,
+    assessment: Option<&Assessment>,
+) -> Result<Evaluate, Fault> {
     let configured = table(root, "evaluate")?;
     let limits = tables(root, "limit")?;
     let given = route.evaluables();
@@ -320,6 +325,9 @@ fn evaluate(root: &Table, route: &Route, rig: Option<&Rig>) -> Result<Evaluate, 
     let mut evaluate = configured.unwrap_or_default();
     if !lists_values && route.point_separator().is_some_and(PointSeparator::is_for_areal_values) {
         evaluate.add_areal();
+    }
+    if !lists_values && assessment.is_some_and(Assessment::has_no_observable_form) {
+        evaluate.add_run_out();
     }
     evaluate.keep_given(&given);
     if let Some(rig) = measures {

@@ -6,13 +6,13 @@ use runout_evaluate::EvaluatedStation;
 use runout_turning::{
     azimuth::Azimuth,
     profile::{Profile, Rejection, TurnLength},
-    reading::ReadingValues,
+    reading::{sensor_id, setup_id},
     rig::Rig,
     separation::{Quantity, SectionAt},
 };
 
 pub(super) fn summarise(station: &EvaluatedStation, rig: Option<&Rig>) -> StationSummary {
-    let EvaluatedStation { result, values, motion_values } = station;
+    let EvaluatedStation { result, values, motion_values, readings } = station;
     let separation = &result.separation;
     let known = |value: f64| value.is_finite().then_some(value);
     let nothing = separation.has_no_observable_form();
@@ -38,7 +38,7 @@ pub(super) fn summarise(station: &EvaluatedStation, rig: Option<&Rig>) -> Statio
         captures: result.profiles.iter().map(|profile| capture_summary(profile, rig)).collect(),
         sections,
         motion_along_deg: azimuth.map(Azimuth::degrees),
-        readings: if nothing { readings(&result.profiles, rig) } else { Vec::new() },
+        readings: if nothing { readings.clone() } else { Vec::new() },
         motion_z_mm: plane_of_values(station),
         motion_values: motion_values.clone(),
         residual_rms_um: known(separation.residual.rms_um),
@@ -62,26 +62,6 @@ pub(super) fn summarise(station: &EvaluatedStation, rig: Option<&Rig>) -> Statio
             .cloned()
             .collect(),
     }
-}
-
-pub(super) fn setup_id(profile: &Profile, rig: Option<&Rig>) -> String {
-    rig.and_then(|rig| rig.setups.get(profile.setup)).map_or_else(String::new, |setup| setup.id.clone())
-}
-
-pub(super) fn sensor_id(index: usize, rig: Option<&Rig>) -> String {
-    rig.and_then(|rig| rig.sensors.get(index)).map_or_else(|| format!("sensor {index}"), |sensor| sensor.id.clone())
-}
-
-/// Every channel of every capture.
-fn readings(profiles: &[Profile], rig: Option<&Rig>) -> Vec<ReadingValues> {
-    let of = |profile: &Profile| -> Vec<ReadingValues> {
-        let setup = setup_id(profile, rig);
-        let channels = profile.sensors.iter().enumerate();
-        channels
-            .filter_map(|(channel, sensor)| ReadingValues::of(profile, channel, &setup, &sensor_id(*sensor, rig)))
-            .collect()
-    };
-    profiles.iter().flat_map(of).collect()
 }
 
 fn capture_summary(profile: &Profile, rig: Option<&Rig>) -> CaptureSummary {

@@ -155,6 +155,27 @@ fn station() -> StationResult {
     }
 }
 
+/// Whether every edge belongs to two triangles, which pass it in opposite directions.
+pub(crate) fn is_closed(triangles: &[[u32; 3]]) -> bool {
+    let mut edges = std::collections::HashMap::new();
+    for [a, b, c] in triangles {
+        for edge in [(a, b), (b, c), (c, a)] {
+            *edges.entry(edge).or_insert(0) += 1;
+        }
+    }
+    edges.iter().all(|((from, to), count)| *count == 1 && edges.get(&(*to, *from)) == Some(&1))
+}
+
+/// What triangles enclose, by the divergence theorem; above 0 where they face outward.
+pub(crate) fn enclosed_mm3(positions: &[[f64; 3]], triangles: &[[u32; 3]]) -> f64 {
+    let of = |triangle: &[u32; 3]| {
+        let [a, b, c] = triangle.map(|corner| positions[corner as usize]);
+        let cross = [b[1] * c[2] - b[2] * c[1], b[2] * c[0] - b[0] * c[2], b[0] * c[1] - b[1] * c[0]];
+        (a[0] * cross[0] + a[1] * cross[1] + a[2] * cross[2]) / 6.0
+    };
+    triangles.iter().map(of).sum()
+}
+
 /// Names in a folder.
 pub(crate) fn names(folder: &Path) -> Vec<String> {
     let mut names: Vec<String> =

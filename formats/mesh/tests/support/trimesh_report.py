@@ -31,7 +31,7 @@ def meshlab(path):
 
 mesh = trimesh.load(sys.argv[1], force="mesh", process=False)
 colours = np.asarray(mesh.visual.vertex_colors) if mesh.visual.kind == "vertex" else np.zeros((0, 4), np.uint8)
-deviation = mesh.vertex_attributes.get("_DEVIATION_UM")
+deviation = mesh.vertex_attributes.get("_DEVIATION_UM", mesh.vertex_attributes.get("quality"))
 print(
     json.dumps(
         {

@@ -3,9 +3,9 @@
 use std::iter::repeat_n;
 
 use super::{STATION, angles_deg, std_of};
-use crate::pipeline::station_summary::{sensor_id, setup_id};
 use runout_numerics::{Complex64, fourier::Fourier};
 use runout_table::{ArrayRef, ColumnSpec, Figure, Measure, TableSpec, numbers, stretches};
+use runout_turning::reading::{sensor_id, setup_id};
 use runout_turning::{
     reading::{coefficients, variances},
     rig::Rig,

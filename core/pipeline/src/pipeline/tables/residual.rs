@@ -1,9 +1,9 @@
 //! The table of what the fit leaves of the averaged readings.
 
 use super::STATION;
-use crate::pipeline::station_summary::{sensor_id, setup_id};
 use runout_numerics::Complex64;
 use runout_table::{ArrayRef, ColumnSpec, TableSpec, counts, numbers, stretches};
+use runout_turning::reading::{sensor_id, setup_id};
 use runout_turning::{profile::Profile, reading::variances, rig::Rig, station::StationResult};
 
 /// Where readings are redundant.

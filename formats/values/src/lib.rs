@@ -1,0 +1,107 @@
+//! Values of a result with their uncertainties, limits and decisions, for other programs: the exporters `csv`, `xlsx` and `q-das`.
+//!
+//! ```toml
+//! [[export]]
+//! plugin = "xlsx"
+//! path = "out/values.xlsx"
+//! tables = ["form"]
+//! ```
+
+mod csv;
+mod file;
+mod q_das;
+mod sheets;
+mod xlsx;
+
+use runout_core::{
+    pipeline::{Plugin, Registry},
+    summary::{Decision, ReportedValue},
+};
+
+pub use csv::CsvConfig;
+pub use q_das::QDasConfig;
+pub use xlsx::XlsxConfig;
+
+/// Adds the exporters `csv`, `xlsx` and `q-das`.
+pub fn register(registry: &mut Registry) {
+    registry.exporters.add(Plugin::of::<CsvConfig>());
+    registry.exporters.add(Plugin::of::<XlsxConfig>());
+    registry.exporters.add(Plugin::of::<QDasConfig>());
+}
+
+/// A cell of a value's row.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Cell<'a> {
+    Text(&'a str),
+    Number(f64),
+    Empty,
+}
+
+impl Cell<'_> {
+    fn number(number: Option<f64>) -> Self {
+        number.map_or(Self::Empty, Self::Number)
+    }
+}
+
+impl<'a> Cell<'a> {
+    fn text(text: Option<&'a str>) -> Self {
+        text.filter(|text| !text.is_empty()).map_or(Self::Empty, Self::Text)
+    }
+}
+
+/// Names of the columns, with the width of a sheet's column in characters.
+const COLUMNS: [(&str, u16); 16] = [
+    ("station", 12),
+    ("of", 16),
+    ("z_mm", 10),
+    ("symbol", 18),
+    ("reference", 22),
+    ("filter", 20),
+    ("value", 12),
+    ("unit", 8),
+    ("std", 12),
+    ("low_95", 12),
+    ("high_95", 12),
+    ("lower_limit", 12),
+    ("upper_limit", 12),
+    ("decision", 16),
+    ("remark", 40),
+    ("about", 60),
+];
+
+/// A value's row, as [`COLUMNS`].
+fn row<'a>(value: &ReportedValue<'a>) -> [Cell<'a>; COLUMNS.len()] {
+    let [low, high] = value.interval_95.map_or([None; 2], |ends| ends.map(Some));
+    let limit = value.limit.map(|(limit, _)| limit);
+    [
+        Cell::text(value.station),
+        Cell::text(value.id.of),
+        Cell::number(value.z_mm),
+        Cell::text(Some(value.id.symbol)),
+        Cell::text(value.id.reference),
+        Cell::text(value.id.filter),
+        Cell::number(value.value),
+        Cell::text(Some(value.unit)),
+        Cell::number(value.std),
+        Cell::number(low),
+        Cell::number(high),
+        Cell::number(limit.and_then(|limit| limit.lower)),
+        Cell::number(limit.and_then(|limit| limit.upper)),
+        Cell::text(decision(value).map(decision_name)),
+        Cell::text(value.remark()),
+        Cell::text(Some(value.about)),
+    ]
+}
+
+fn decision(value: &ReportedValue) -> Option<Decision> {
+    value.limit.map(|(_, found)| found.decision)
+}
+
+/// As `summary.json` writes it.
+fn decision_name(decision: Decision) -> &'static str {
+    match decision {
+        Decision::Conforms => "conforms",
+        Decision::DoesNotConform => "does-not-conform",
+        Decision::Undecided => "undecided",
+    }
+}
