@@ -9,13 +9,12 @@ use super::{
     diagnosis::{Diagnosis, Refused, Unexplained},
     evidence::Evidence,
     fit::{INDEPENDENT, Refit, refit},
-    found::Found,
+    found::{Declaration, Found},
     judgement::{
         OVERLAP, above_chance, at_the_floor, independent, is, mixed, no_gain, noise_only, overlap, raises_held_out,
         too_little, unit,
     },
     keyed::Keyed,
-    mistakes::Declaration,
     report::{added, blind, level, moved, verdict},
 };
 use runout_consistency::{Check, Test};

@@ -1,6 +1,6 @@
 //! An effect that was found.
 
-use super::{Remainder, evidence::Evidence};
+use super::{Remainder, evidence::Evidence, fit::Refit};
 
 /// An effect that was added, with everything that it cannot be distinguished from.
 #[derive(Clone)]
@@ -15,4 +15,14 @@ pub(super) struct Found {
     pub evidence: Evidence,
     pub before: Remainder,
     pub after: Remainder,
+}
+
+/// What the search for mistakes finds.
+pub(super) enum Declaration<F> {
+    /// Nothing that the data prove.
+    Sound,
+    /// Less than this effect explains, which therefore comes first.
+    Beside(Box<Found>),
+    /// Mistakes; the fit with them corrected.
+    Corrected(Refit<F>),
 }

@@ -5,7 +5,7 @@ use super::{
     closed_loop::Tracing,
     evidence::Evidence,
     fit::Refit,
-    found::Found,
+    found::{Declaration, Found},
     judgement::{same_finding, worse},
 };
 use runout_error::Result;
@@ -21,16 +21,6 @@ const LEFT_OF_UNKNOWN: f64 = 0.01;
 const NEAR_NOISE: f64 = 4.0;
 /// Corrections whose χ² differ by less than this, in units of what is left, cannot be distinguished.
 const SAME_CHI2: f64 = 10.0;
-
-/// What the search for mistakes finds.
-pub(super) enum Declaration<F> {
-    /// Nothing that the data prove.
-    Sound,
-    /// Less than this effect explains, which therefore comes first.
-    Beside(Box<Found>),
-    /// Mistakes; the fit with them corrected.
-    Corrected(Refit<F>),
-}
 
 impl<M: Model> Tracing<'_, M> {
     /// Corrects the mistakes that the data prove, before anything else is looked for.

@@ -4,7 +4,7 @@ use std::{fmt, sync::Arc};
 
 use runout_core::{Complex64, rig};
 
-use crate::effects::Turning;
+use crate::turning::Turning;
 
 /// Everything that effects change, at its declared value until one does.
 #[derive(Debug, Clone)]

@@ -110,6 +110,16 @@ impl View {
 }
 
 impl Layout {
+    /// How far radial sensors are apart along the axis, in mm; infinite where there are none.
+    #[must_use]
+    pub fn span_mm(&self) -> f64 {
+        let radial = self.readings.iter().filter(|reading| !reading.view.is_axial());
+        let [low, high] = radial.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], reading| {
+            [low.min(reading.lever_mm), high.max(reading.lever_mm)]
+        });
+        if low <= high { high - low } else { f64::INFINITY }
+    }
+
     /// The layout of a rig. `odd_motion` assumes, as the four-sensor paper's equation (7) does, that motion has odd
     /// orders only, so that it changes sign after half a turn: even orders then count with the opposite sign in every
     /// setup but the first.

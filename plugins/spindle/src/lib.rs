@@ -10,6 +10,7 @@ pub mod separators;
 pub mod simulate;
 mod sizes;
 mod solve;
+mod turning;
 mod wiring;
 
 use runout_core::pipeline::{Plugin, Registry};

@@ -100,7 +100,7 @@ fn of_data(summary: &Summary) -> (String, Judgement) {
             };
             (found + &warnings, judgement)
         }
-        None => ("No reading is redundant, so nothing checks the result".into(), Judgement::Open),
+        None => ("Nothing in the data tests the result".into(), Judgement::Open),
     }
 }
 

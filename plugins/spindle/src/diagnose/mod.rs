@@ -14,6 +14,7 @@ mod rig_keys;
 mod said;
 mod solved;
 mod strangers;
+mod weighed;
 
 use std::sync::Arc;
 
@@ -184,7 +185,13 @@ impl Model for SpindleModel {
     }
 
     fn is_possible(&self, effect: usize, values: &[f64]) -> bool {
-        self.traced.kind(effect).is_possible(values, &self.traced.layout)
+        let (kind, layout) = (self.traced.kind(effect), &self.traced.layout);
+        let mut alterations = Alterations::none(layout);
+        kind.alter(self.traced.places[effect].index, values, &mut alterations);
+        // A sensor that is farther off than sensors are apart is in another section, or on no part.
+        let span_mm = layout.span_mm();
+        let are_on_the_part = alterations.sensors.iter().all(|sensor| sensor.z_mm.abs() <= span_mm);
+        kind.is_possible(values) && alterations.are_possible() && are_on_the_part
     }
 
     fn size(&self, effect: usize, values: &[f64]) -> f64 {

@@ -4,7 +4,6 @@
 use runout_core::{Complex64, model::diagnosis::Estimated};
 
 use super::{About, ActsOn, Alterations, Harmonic, Predicted, SpindleEffect, as_amplitude, last_order, parameter};
-use crate::layout::Layout;
 
 /// Largest amplitude in µm. Spindles move by micrometres along their axes. Where the form has next to no slope along z, a far
 /// larger motion can reproduce what other effects leave.
@@ -32,7 +31,7 @@ impl SpindleEffect for AxialMotion {
         products.into_iter().map(|product| product.into_iter().map(|value| -1e-3 * value).collect()).collect()
     }
 
-    fn is_possible(&self, values: &[f64], _layout: &Layout) -> bool {
+    fn is_possible(&self, values: &[f64]) -> bool {
         values.iter().map(|value| value * value).sum::<f64>().sqrt() <= LARGEST_UM
     }
 

@@ -24,7 +24,6 @@ use super::{
     About, ActsOn, Alterations, GAIN_TOLERANCE, Predicted, RAD_PER_DEG, SpindleEffect, Transfer, parameter,
     size_of_gain,
 };
-use crate::layout::Layout;
 
 /// An effect of one value that is a response of channels.
 pub(crate) struct ChannelResponse {
@@ -163,7 +162,7 @@ impl SpindleEffect for ChannelResponse {
         matches!(self.response, Response::LowPass(polynomial) if polynomial.len() > FIRST.len()).then_some(FIRST_ORDER)
     }
 
-    fn is_possible(&self, values: &[f64], _layout: &Layout) -> bool {
+    fn is_possible(&self, values: &[f64]) -> bool {
         match self.response {
             // A negative one amplifies.
             Response::LowPass(_) => values.first().is_some_and(|inverse_cutoff| *inverse_cutoff > 0.0),

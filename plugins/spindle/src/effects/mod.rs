@@ -42,11 +42,11 @@ use runout_core::{
 };
 
 pub use crate::alterations::{Alterations, Harmonic, Pattern, PatternOf, SensorAlteration, SetupAlteration, Transfer};
+pub use crate::turning::Turning;
 pub use correct::creep;
 use mistakes::ordered_pairs;
 pub use mistakes::{Mistake, pair_of, pairs};
 pub use predicted::Predicted;
-pub use turning_phase::Turning;
 
 use crate::layout::Layout;
 use channel_response::ChannelResponse;
@@ -110,7 +110,7 @@ pub trait SpindleEffect: Send + Sync {
     }
 
     /// Whether its parameters can have these values.
-    fn is_possible(&self, _values: &[f64], _layout: &Layout) -> bool {
+    fn is_possible(&self, _values: &[f64]) -> bool {
         true
     }
 

@@ -29,14 +29,6 @@ impl SpindleEffect for SensorAxialPosition {
         layout.readings.iter().any(|reading| reading.sensor == target && !reading.view.is_axial())
     }
 
-    /// Not farther off than the sensors are apart: it would be in another section, or on no part.
-    fn is_possible(&self, values: &[f64], layout: &Layout) -> bool {
-        let radial = || layout.readings.iter().filter(|reading| !reading.view.is_axial());
-        let levers_mm = || radial().map(|reading| reading.lever_mm);
-        let span_mm = levers_mm().fold(f64::NEG_INFINITY, f64::max) - levers_mm().fold(f64::INFINITY, f64::min);
-        values.iter().all(|shift_mm| shift_mm.abs() <= span_mm)
-    }
-
     fn alter(&self, target: usize, values: &[f64], alterations: &mut Alterations) {
         let sensor = &mut alterations.sensors[target];
         sensor.z_mm += values[0];

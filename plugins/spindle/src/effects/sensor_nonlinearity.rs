@@ -3,7 +3,6 @@
 use runout_core::Complex64;
 
 use super::{About, ActsOn, Alterations, Predicted, RigKey, SpindleEffect, parameter};
-use crate::layout::Layout;
 
 /// Largest coefficients, in 1/µm and 1/µm²: a hundred and a thousand times what is usual. Where a characteristic leaves next to no
 /// trace, as of a sensor that nothing but itself checks, a far larger one can reproduce noise.
@@ -40,7 +39,7 @@ impl SpindleEffect for SensorNonlinearity {
         ]
     }
 
-    fn is_possible(&self, values: &[f64], _layout: &Layout) -> bool {
+    fn is_possible(&self, values: &[f64]) -> bool {
         values.iter().all(|value| value.abs() <= LARGEST)
     }
 

@@ -47,7 +47,7 @@ impl SpindleEffect for ProbeSpot {
         vec![predicted.each(|reading| reading.sensor == target, change)]
     }
 
-    fn is_possible(&self, values: &[f64], _layout: &Layout) -> bool {
+    fn is_possible(&self, values: &[f64]) -> bool {
         // Another sensor's spot is wider where this one's would have to be negative.
         values.iter().all(|square| *square > 0.0)
     }
