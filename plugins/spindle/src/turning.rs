@@ -26,10 +26,16 @@ impl Default for Turning {
 const LEAST: f64 = 1e-3;
 
 impl Turning {
+    /// Whether they turn at all.
+    #[must_use]
+    pub fn is_there(&self) -> bool {
+        self.run_rad != 0.0 || self.step_rad != 0.0
+    }
+
     /// H(n).
     #[must_use]
     pub fn response(&self, order: usize) -> Complex64 {
-        if self.run_rad == 0.0 && self.step_rad == 0.0 {
+        if !self.is_there() {
             return Complex64::ONE;
         }
         let response = self.of_run(order) * self.of_step(order);

@@ -198,8 +198,8 @@ impl Parts {
         tested.min_by(|a, b| a.p.total_cmp(&b.p))
     }
 
-    /// Size of a shape in the mean over orders, its standard uncertainty by their scatter, and the degrees of freedom of that. No order decides alone: three at least
-    /// share the weight.
+    /// Size of a shape in the mean over orders, its standard uncertainty by their scatter, and the degrees of freedom of that. No order
+    /// decides alone: three at least share the weight.
     fn over_orders(&self, shape: &[f64]) -> Option<(f64, f64, f64)> {
         let square: f64 = shape.iter().map(|value| value * value).sum();
         let mut orders: Vec<(usize, f64, f64)> = Vec::new();

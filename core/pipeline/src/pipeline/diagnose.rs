@@ -116,7 +116,7 @@ fn diagnose_turns(
     )?;
     let settings = &pipeline.diagnose.settings;
     let found = hidden_readings::diagnose(&mut stations, settings, line.rig, (separator, model))?;
-    let mut diagnosis = found.diagnosis;
+    let (mut diagnosis, turned_back) = (found.diagnosis, found.turned_back);
     diagnosis.moved.clear();
     let mut writer = ResultWriter::begin(pipeline, &pipeline.diagnosed, recording.stations())?;
     let known = known(model.effects(), &settings.known, |effect| model.changes(effect, &settings.known));
@@ -142,7 +142,12 @@ fn diagnose_turns(
             EvaluatedStation::of(result, evaluate, radius_mm, Some(line.rig), recording.stations().len())
         };
         let declared = complete(before, Vec::new(), &looked_at);
-        let found = complete(after, station.profiles, &pipeline.evaluate);
+        // What the model takes out of the turns refutes none of its values.
+        let mut profiles = station.profiles;
+        for profile in profiles.iter_mut().filter(|profile| turned_back.contains(&profile.setup)) {
+            profile.course = profile.course.without_phase();
+        }
+        let found = complete(after, profiles, &pipeline.evaluate);
         diagnosis.moved.extend(moved::moved(&declared, &found, &looked_at, radius_mm, several));
         for (errors, EvaluatedStation { result, .. }) in errors.iter_mut().zip([&declared, &found]) {
             let forms = (0..result.separation.sections.len()).map(Quantity::Form);

@@ -366,7 +366,10 @@ fn run(model: &SpindleModel, stations: &[Station], settings: &Settings) -> Resul
         diagnosis.warnings.insert(0, NOTHING_SEPARATED.into());
     }
     diagnosis.warnings.extend(model.traced.warnings());
+    let altered = model.alterations(&closed.settings).setups;
+    let turned_back = altered.iter().zip(&selection.setups).filter(|(setup, _)| setup.turning.is_there());
     Ok(StationDiagnosis {
+        turned_back: turned_back.map(|(_, setup)| *setup).collect(),
         diagnosis,
         before: closed.before.separations(stations),
         after: closed.after.separations(stations),

@@ -59,7 +59,7 @@ impl Solved {
         }
         let altered = data.altered(alterations, data.part);
         for (course, setup) in corrected.courses.iter_mut().zip(&altered.setups) {
-            if setup.turning.run_rad != 0.0 || setup.turning.step_rad != 0.0 {
+            if setup.turning.is_there() {
                 *course = course.without_phase();
             }
         }
