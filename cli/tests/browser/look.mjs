@@ -17,7 +17,8 @@ const browser = await puppeteer.launch({
 const page = await browser.newPage();
 page.setDefaultTimeout(180000);
 page.on("console", (message) => found.console.push(`${message.type()}: ${message.text()}`));
-page.on("pageerror", (error) => found.console.push(`error: ${error.message}`));
+// An error of the page ends the look: what waits for its effect would wait in vain.
+page.on("pageerror", (error) => { console.error(`error of the page: ${error.message}`); process.exit(1); });
 const address = pathToFileURL(resolve(report)).href;
 page.on("request", (request) => {
   const url = request.url();

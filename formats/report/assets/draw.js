@@ -143,7 +143,7 @@ const Draw = (() => {
       });
     });
     // Peak and valley of a form alone: of several curves the marks would hide each other.
-    const only = curves.length === 1 && figure.id.startsWith("form") ? curves[0] : null;
+    const only = curves.length === 1 && figure.id?.startsWith("form") ? curves[0] : null;
     const extremes = [];
     if (only) {
       for (const [name, symbol, better] of [["peak", "triangle-up", (a, b) => a > b], ["valley", "triangle-down", (a, b) => a < b]]) {
