@@ -100,6 +100,18 @@ pub enum Verdict {
     NothingFound,
 }
 
+impl Verdict {
+    /// The verdict of the same final model, reached from a declaration that something was added to.
+    #[must_use]
+    pub fn with_addition(self) -> Self {
+        match self {
+            Self::AtNoiseFloor => Self::Explained,
+            Self::NothingFound => Self::Improved,
+            other => other,
+        }
+    }
+}
+
 /// How far a model is from its data.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Level {

@@ -108,7 +108,7 @@ pub struct Planted {
 }
 
 /// The effects that are planted: their ids, and those of a single setup.
-pub const EFFECTS: [&str; 40] = [
+pub const EFFECTS: [&str; 42] = [
     "sensor-gain",
     "sensor-angle",
     "sensor-axial-position",
@@ -149,6 +149,8 @@ pub const EFFECTS: [&str; 40] = [
     "sensors-swapped-of-setup",
     "rotation-reversed-of-setup",
     "sensor-unit",
+    "lost-samples",
+    "turn-ratio",
 ];
 /// Those of which two are planted at a time.
 const PAIRED: [&str; 7] = [

@@ -47,6 +47,7 @@ impl Chance {
             "sensor-gain-of-setup" | "sensor-angle-of-setup" | "setup-gain" | "index-offset" => {
                 self.of_one_setup(id, config)
             }
+            "lost-samples" | "turn-ratio" => self.of_turning(id, config),
             "probe-spot" | "bracket-motion" => self.of_shares(id, config),
             "chuck-form" | "clamping-form" | "electrical-run-out" => self.of_pattern(id, config),
             "dent" | "backlash" | "step" | "slipped-probe" => self.stranger(id, config),

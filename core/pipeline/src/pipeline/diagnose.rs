@@ -9,7 +9,7 @@ use corrected_rig::Change;
 
 use super::{
     config::{Pipeline, Route, exports::spare_inputs},
-    hidden_readings,
+    exchanged_stations, hidden_readings,
     observer::Observer,
     point_run::{self, PointResult},
     record_reader::{RecordReader, separate},
@@ -115,7 +115,10 @@ fn diagnose_turns(
         },
     )?;
     let settings = &pipeline.diagnose.settings;
-    let found = hidden_readings::diagnose(&mut stations, settings, line.rig, (separator, model))?;
+    let mut exchanged = exchanged_stations::put_right(&mut stations, settings, line.rig, separator)?;
+    let mut found = hidden_readings::diagnose(&mut stations, settings, line.rig, (separator, model))?;
+    let as_named: Vec<_> = (0..stations.len()).map(|station| exchanged.declared(station)).collect();
+    exchanged.say(&mut found);
     let (mut diagnosis, turned_back) = (found.diagnosis, found.turned_back);
     diagnosis.moved.clear();
     let mut writer = ResultWriter::begin(pipeline, &pipeline.diagnosed, recording.stations())?;
@@ -129,11 +132,14 @@ fn diagnose_turns(
     let (mut as_declared, mut turns) = (DeclaredStations::default(), TurnsOfAll::default());
     let (radius_mm, several) = (line.rig.part_radius_mm, stations.len() > 1);
     let looked_at = pipeline.evaluate.first_ront();
-    for (index, (station, (before, after))) in
-        stations.into_iter().zip(found.before.into_iter().zip(found.after)).enumerate()
-    {
-        // Before is what a run gives, which leaves known effects alone.
-        let before = if settings.known.is_empty() { separate(separator, &station, line.rig)? } else { before };
+    let solved = found.before.into_iter().zip(found.after).zip(as_named);
+    for (index, (station, ((before, after), as_named))) in stations.into_iter().zip(solved).enumerate() {
+        // Before is what a run gives, which leaves known effects and names of stations alone.
+        let before = match as_named {
+            Some(named) => named,
+            None if settings.known.is_empty() => separate(separator, &station, line.rig)?,
+            None => before,
+        };
         let angles = station.profiles.first().map_or(0, |profile| profile.samples_per_rev);
         let truth = recording.truth(index)?;
         let complete = |separation, profiles, evaluate| {

@@ -1,8 +1,8 @@
 //! Delays, filters and shares of channels, and what one setup has by itself.
 
 use runout_spindle::simulate::{
-    ChannelDelay, ChannelGhost, ChannelSkew, CrossTalk, Effect, FilterAttenuation, IndexOffset, SensorAngle,
-    SensorGain, SetupGain, SpindleConfig,
+    ChannelDelay, ChannelGhost, ChannelSkew, CrossTalk, Effect, FilterAttenuation, IndexOffset, LostSamples,
+    SensorAngle, SensorGain, SetupGain, SpindleConfig, TurnRatio,
 };
 
 use super::{FINE_SAMPLES, planted};
@@ -91,5 +91,23 @@ impl Chance {
                 (Effect::IndexOffset(IndexOffset { targets: setups, angle_deg, declared }), planted)
             }
         }
+    }
+
+    /// How the recording of one setup turns against its mark.
+    pub(super) fn of_turning(&mut self, id: &str, config: &SpindleConfig) -> (Effect, Planted) {
+        let setup = self.later_setup(config);
+        let targets = vec![setup.clone()];
+        if id == "turn-ratio" {
+            let turning_deg = self.signed(2e-4, 0.2, false);
+            let parameters = vec![("turning", turning_deg)];
+            let planted = planted("turn-ratio", Some(&setup), parameters, format!("{turning_deg:+.4}°/rev"));
+            return (Effect::TurnRatio(TurnRatio { targets, turning_deg, declared: false }), planted);
+        }
+        let turns = config.recording.revolutions as f64;
+        let (angle_deg, after_turns) = (self.size(0.01, 20.0), turns * self.between(0.2, 0.7));
+        let parameters = vec![("lost", angle_deg), ("after", after_turns)];
+        let size = format!("{angle_deg:.3}° after {after_turns:.1} turns");
+        let planted = planted("lost-samples", Some(&setup), parameters, size);
+        (Effect::LostSamples(LostSamples { targets, after_turns, angle_deg, declared: false }), planted)
     }
 }

@@ -1,0 +1,184 @@
+//! Stations whose recordings are exchanged in one setup: a mistake that no single station shows, so that it is looked for before the closed loop.
+//!
+//! The form at a station has to be the same in all setups. Two stations that contradict themselves, and agree once their profiles of one setup are
+//! exchanged, were recorded under each other's name.
+
+use crate::stage::{Station, StationDiagnosis, StationSeparator};
+use runout_closed_loop::{
+    closed_loop::Settings,
+    diagnosis::{Added, Step},
+};
+use runout_error::Result;
+use runout_turning::{rig::Rig, separation::Separation};
+
+/// χ² per degree of freedom from which on a station contradicts itself.
+const SUSPICIOUS_CHI2: f64 = 10.0;
+/// Two stations are exchanged where that leaves less than this share of χ² at one of them, and no more than before at the other: a third may hold its
+/// profile.
+const LEFT: f64 = 0.1;
+/// Stations that are tried in pairs, those that contradict themselves most: each pair takes two separations a setup.
+const MOST_TRIED: usize = 12;
+/// Gains that differ by less than this share are the same exchange, seen from the other of two setups.
+const SAME: f64 = 1e-3;
+const ID: &str = "stations-exchanged";
+
+/// What was exchanged.
+pub(super) struct Exchanged {
+    added: Vec<Added>,
+    advice: Vec<String>,
+    /// Separations of the recordings as they are named, by station.
+    declared: Vec<Option<Separation>>,
+    /// Root mean square of the residual and χ² per degree of freedom over all stations, as they are named.
+    level: Left,
+}
+
+/// Looks for exchanged stations, and puts their profiles right.
+///
+/// # Errors
+/// When a station cannot be separated.
+pub(super) fn put_right(
+    stations: &mut [Station],
+    settings: &Settings,
+    rig: &Rig,
+    separator: &dyn StationSeparator,
+) -> Result<Exchanged> {
+    let none = Exchanged { added: Vec::new(), advice: Vec::new(), declared: Vec::new(), level: Left::default() };
+    // A list of effects leaves out this one.
+    if stations.len() < 2 || rig.setups.len() < 2 || settings.effects.is_some() {
+        return Ok(none);
+    }
+    let left_of = |station: &Station| Ok(Left::of(&separator.separate(station)?));
+    let mut left = stations.iter().map(left_of).collect::<Result<Vec<Left>>>()?;
+    let level = Left::of_all(&left);
+    let names: Vec<String> = stations.iter().map(|station| station.name.clone()).collect();
+    let mut found = Exchanged { level, declared: vec![None; stations.len()], ..none };
+    while let Some(best) = best_exchange(stations, &left, separator)? {
+        let before = Left::of_all(&left);
+        for (station, after) in best.pair.into_iter().zip(best.after) {
+            if found.declared[station].is_none() {
+                found.declared[station] = Some(separator.separate(&stations[station])?);
+            }
+            left[station] = after;
+        }
+        exchange(stations, best.profile, best.pair);
+        let profile = &stations[best.pair[0]].profiles[best.profile];
+        found.note(rig, profile.setup, best.pair.map(|station| names[station].as_str()), [before, Left::of_all(&left)]);
+    }
+    Ok(found)
+}
+
+impl Exchanged {
+    fn note(&mut self, rig: &Rig, setup: usize, [one, other]: [&str; 2], [before, after]: [Left; 2]) {
+        let setups = || rig.setups.iter().map(|setup| &setup.id);
+        let id = &rig.setups[setup].id;
+        // Of two setups, each may be the one that is named right.
+        let others = setups().filter(|other| *other != id && rig.setups.len() == 2);
+        self.added.push(Added {
+            effect: ID.into(),
+            targets: vec![id.clone(), one.into(), other.into()],
+            confounded_with: others.map(|setup| format!("{ID} {setup} {one} {other}")).collect(),
+            distinguished_by: (rig.setups.len() == 2).then(|| "a third setup".into()),
+            parameters: Vec::new(),
+            change: None,
+            residual_rms_um: Step { before: Some(before.rms_um), after: Some(after.rms_um) },
+            held_out_rms_um: Step { before: None, after: None },
+            held_out_expected_rms_um: None,
+            delta_bic: after.chi2() - before.chi2(),
+            p_value: 0.0,
+        });
+        self.advice.push(format!(
+            "stations `{one}` and `{other}` are exchanged in setup `{id}`: exchange the names of the two recordings"
+        ));
+    }
+
+    /// The separation of a station's recordings as they are named, where others took their place.
+    pub(super) fn declared(&mut self, station: usize) -> Option<Separation> {
+        self.declared.get_mut(station)?.take()
+    }
+
+    /// Says in a diagnosis what was exchanged before it.
+    pub(super) fn say(self, found: &mut StationDiagnosis) {
+        if self.added.is_empty() {
+            return;
+        }
+        let diagnosis = &mut found.diagnosis;
+        diagnosis.before.residual_rms_um = self.level.rms_um;
+        diagnosis.before.chi2_per_dof = Some(self.level.chi2_per_dof);
+        diagnosis.before.held_out_rms_um = None;
+        diagnosis.added.splice(0..0, self.added);
+        diagnosis.warnings.splice(0..0, self.advice);
+        diagnosis.verdict = diagnosis.verdict.with_addition();
+    }
+}
+
+/// Two stations whose profiles of one setup are exchanged, and what is left of them then.
+struct Exchange {
+    profile: usize,
+    pair: [usize; 2],
+    after: [Left; 2],
+    /// χ² that it takes away.
+    gain: f64,
+}
+
+fn best_exchange(
+    stations: &mut [Station],
+    left: &[Left],
+    separator: &dyn StationSeparator,
+) -> Result<Option<Exchange>> {
+    let mut tried: Vec<usize> = (0..stations.len()).filter(|one| left[*one].chi2_per_dof > SUSPICIOUS_CHI2).collect();
+    tried.sort_by(|a, b| left[*b].chi2_per_dof.total_cmp(&left[*a].chi2_per_dof));
+    tried.truncate(MOST_TRIED);
+    let mut best: Option<Exchange> = None;
+    for (place, &one) in tried.iter().enumerate() {
+        for &other in &tried[..place] {
+            let pair = [one.min(other), one.max(other)];
+            // Of two setups, the first is taken for the one that is named right.
+            for profile in (0..stations[one].profiles.len().min(stations[other].profiles.len())).rev() {
+                exchange(stations, profile, pair);
+                let separated = pair.map(|station| separator.separate(&stations[station]));
+                exchange(stations, profile, pair);
+                let [first, second] = separated;
+                let (before, after) = (pair.map(|station| left[station]), [Left::of(&first?), Left::of(&second?)]);
+                let [share, other] = [0, 1].map(|at| after[at].chi2_per_dof / before[at].chi2_per_dof);
+                let gain = before.iter().map(Left::chi2).sum::<f64>() - after.iter().map(Left::chi2).sum::<f64>();
+                let more = best.as_ref().is_none_or(|best| gain > best.gain * (1.0 + SAME));
+                if share.min(other) < LEFT && share.max(other) <= 1.0 && more {
+                    best = Some(Exchange { profile, pair, after, gain });
+                }
+            }
+        }
+    }
+    Ok(best)
+}
+
+fn exchange(stations: &mut [Station], profile: usize, [one, other]: [usize; 2]) {
+    let (before, from) = stations.split_at_mut(other);
+    std::mem::swap(&mut before[one].profiles[profile], &mut from[0].profiles[profile]);
+}
+
+/// What a separation leaves of its readings.
+#[derive(Clone, Copy, Default)]
+struct Left {
+    rms_um: f64,
+    chi2_per_dof: f64,
+    dof: f64,
+}
+
+impl Left {
+    fn of(separation: &Separation) -> Self {
+        let residual = &separation.residual;
+        Self { rms_um: residual.rms_um, chi2_per_dof: residual.chi2_per_dof, dof: residual.dof as f64 }
+    }
+
+    /// Over all stations.
+    fn of_all(all: &[Self]) -> Self {
+        let dof: f64 = all.iter().map(|left| left.dof).sum();
+        let squares: f64 = all.iter().map(|left| left.rms_um.powi(2)).sum();
+        let chi2: f64 = all.iter().map(Self::chi2).sum();
+        Self { rms_um: (squares / all.len() as f64).sqrt(), chi2_per_dof: chi2 / dof, dof }
+    }
+
+    fn chi2(&self) -> f64 {
+        self.chi2_per_dof * self.dof
+    }
+}
