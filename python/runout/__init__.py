@@ -15,8 +15,8 @@ from ._commands import check, compare, diagnose, inspect, plan, run, simulate
 from ._native import Layout, Surface, Table, __version__
 from .errors import CommandError, ConfigurationError, DataError, Error
 from .pipeline import Pipeline
-from .recording import Capture, Recording
-from .result import Added, Diagnosis, Level, Parameter, Result, Value
+from .recording import Capture, Points, Recording
+from .result import Added, Comparison, Diagnosis, Level, Parameter, Plan, Result, Value, values
 
 if TYPE_CHECKING:
     from . import checks as checks
@@ -44,6 +44,7 @@ __all__ = [
     "Added",
     "Capture",
     "CommandError",
+    "Comparison",
     "ConfigurationError",
     "DataError",
     "Diagnosis",
@@ -52,6 +53,8 @@ __all__ = [
     "Level",
     "Parameter",
     "Pipeline",
+    "Plan",
+    "Points",
     "Recording",
     "Result",
     "Surface",
@@ -65,4 +68,5 @@ __all__ = [
     "plan",
     "run",
     "simulate",
+    "values",
 ]

@@ -9,10 +9,9 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Union
 
 from . import _native, _toml
-from .pipeline import Source, job
+from .pipeline import Data, Source, job
 from .plugins import Effect, Method, Separator
-from .recording import Recording
-from .result import Diagnosis, Result
+from .result import Comparison, Diagnosis, Plan, Result
 
 Progress = Callable[[int, int, str], object]
 """Called with the number of stations that are done, of all, and the name of the last one. What it raises stops the work."""
@@ -23,7 +22,7 @@ Plugin = Union[Separator, Effect]
 
 def run(
     pipeline: Source,
-    recording: Recording | None = None,
+    recording: Data | None = None,
     *,
     set: Overrides | None = None,
     threads: int | None = None,
@@ -33,7 +32,8 @@ def run(
 ) -> Result:
     """Loads, preprocesses, separates, evaluates and exports.
 
-    `pipeline` is a TOML file, a dictionary with its keys, or a `Pipeline`. `recording` takes the place of its `[load]`. `set`
+    `pipeline` is a TOML file, a dictionary with its keys, or a `Pipeline`. `recording`, a
+    `Recording` or `Points`, takes the place of its `[load]`. `set`
     overrides keys: `{"preprocess.0.cutoff_hz": 300}`. With `surface` the form over angle and z is kept as well; it is kept
     in any case where an exporter or a value needs it. `plugins` are separators and effects of one's own (`runout.plugins`), which the pipeline
     may name; what their code raises, the call raises.
@@ -46,7 +46,7 @@ def run(
 
 def diagnose(
     pipeline: Source,
-    recording: Recording | None = None,
+    recording: Data | None = None,
     *,
     set: Overrides | None = None,
     threads: int | None = None,
@@ -61,14 +61,14 @@ def diagnose(
 def compare(
     pipeline: Source,
     methods: Sequence[Method] = (),
-    recording: Recording | None = None,
+    recording: Data | None = None,
     *,
     set: Overrides | None = None,
     threads: int | None = None,
     progress: Progress | None = None,
     plugins: Sequence[Plugin] = (),
-) -> dict[str, Any]:
-    """Compares separators on the same data, as the document of `compare.schema.json`.
+) -> Comparison:
+    """Compares separators on the same data: the document of `compare.schema.json`, with tables of it.
 
     `methods` are names, or separators of one's own. Without them, all of `[[compare]]`, or else every other separator. Arguments and
     exceptions as of `run`.
@@ -77,12 +77,12 @@ def compare(
         raise TypeError("expected a list of separators, found a string")
     own = [method for method in methods if not isinstance(method, str)]
     names = [method if isinstance(method, str) else method.name for method in methods]
-    return _document(_native.compare(job(pipeline, recording, set, [*plugins, *own]), names, threads, progress))
+    return Comparison(_document(_native.compare(job(pipeline, recording, set, [*plugins, *own]), names, threads, progress)))
 
 
 def check(
     pipeline: Source,
-    recording: Recording | None = None,
+    recording: Data | None = None,
     *,
     set: Overrides | None = None,
     plugins: Sequence[Plugin] = (),
@@ -101,8 +101,8 @@ def plan(
     criterion: str | None = None,
     seed: int | None = None,
     set: Overrides | None = None,
-) -> dict[str, Any]:
-    """Says what a rig can separate and how well, as the document of `plan.schema.json`.
+) -> Plan:
+    """Says what a rig can separate and how well: the document of `plan.schema.json`, with tables of it.
 
     `rig` is a file or a dictionary with the keys of `[rig]`; or a pipeline of measured points, as a file or a dictionary.
     `orders` are the first and the last, 2 and 150 without it. The other arguments are the options of `runout plan`.
@@ -116,7 +116,7 @@ def plan(
     words += [] if angle_tolerance_deg is None else ["--angle-tolerance", f"{angle_tolerance_deg}deg"]
     words += [] if criterion is None else ["--criterion", criterion]
     words += [] if seed is None else ["--seed", str(seed)]
-    return _of_file("plan", rig, words, set)
+    return Plan(_of_file("plan", rig, words, set))
 
 
 def simulate(

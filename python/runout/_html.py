@@ -9,6 +9,13 @@ from itertools import islice
 MOST_ROWS = 60
 
 
+class Shown(str):
+    """A piece of HTML that a notebook shows."""
+
+    def _repr_html_(self) -> str:
+        return str(self)
+
+
 def cell(content: object) -> str:
     """A number to six digits, or a text."""
     if content is None:

@@ -115,6 +115,16 @@ class Table:
     def __getitem__(self, name: str) -> Any:
         """A column as a NumPy array; texts as a list. Numbers that are null are NaN."""
 
+    @property
+    def drawings(self) -> str:
+        """What is drawn of it, as JSON: a list of figures."""
+
+    def to_pandas(self) -> Any:
+        """A frame of pandas, with the units in its `attrs`."""
+
+    def to_polars(self) -> Any:
+        """A frame of polars, which shares its memory."""
+
     def __arrow_c_stream__(self, requested_schema: object | None = None) -> object: ...
     def __arrow_c_schema__(self) -> object: ...
 

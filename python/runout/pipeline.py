@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 import os
+import tempfile
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Union
 
 from . import _toml
 from .plugins import Own, checked, named
-from .recording import Recording, Station
+from .recording import Points, Recording, Station
 from .tables import Diagnose, Evaluate, Limit, Rig, Surface
 
 Stage = Union[Mapping[str, Any], Any]
@@ -19,10 +20,10 @@ take separators of one's own as well (`runout.plugins.Separator`)."""
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Pipeline:
-    """The same keys as in TOML. Paths are relative to `folder`. `load` may be a `Recording`."""
+    """The same keys as in TOML. Paths are relative to `folder`. `load` may be a `Recording` or `Points`."""
 
     separate: Stage
-    load: Union[Stage, Recording, None] = None
+    load: Union[Stage, Recording, Points, None] = None
     rig: Union[Mapping[str, Any], Rig, str, os.PathLike[str], None] = None
     preprocess: Sequence[Stage] = ()
     title: str | None = None
@@ -36,9 +37,9 @@ class Pipeline:
     folder: Union[str, os.PathLike[str]] = "."
 
     def to_toml(self) -> str:
-        """The pipeline as a file would hold it. A recording in memory is `plugin = "arrays"`, which only Python knows."""
+        """The pipeline as a file would hold it. What is in memory is `plugin = "arrays"`, which only Python knows."""
         keys, _ = self._named()
-        if isinstance(self.load, Recording) or self.load is None:
+        if isinstance(self.load, (Recording, Points)) or self.load is None:
             keys["load"] = {"plugin": "arrays"}
         empty = {name for name, of in keys.items() if isinstance(of, (list, tuple)) and not of}
         return _toml.document({name: of for name, of in keys.items() if name not in empty})
@@ -57,25 +58,28 @@ class Job:
     set: list[str]
     stations: list[Station] | None
     plugins: list[Own]
+    held: Any = None
+    """A folder that lives as long as the call."""
 
 
 Source = Union[str, os.PathLike[str], Mapping[str, Any], Pipeline]
+Data = Union[Recording, Points]
 
 
 def job(
-    pipeline: Source, recording: Recording | None, overrides: Mapping[str, Any] | None, plugins: Iterable[Any] = ()
+    pipeline: Source, data: Data | None, overrides: Mapping[str, Any] | None, plugins: Iterable[Any] = ()
 ) -> Job:
     """The job of a pipeline: a file, a dictionary with the keys of TOML, or a `Pipeline`."""
-    if recording is not None and not isinstance(recording, Recording):
-        raise TypeError(f"expected a runout.Recording, found {type(recording).__name__}")
+    if data is not None and not isinstance(data, (Recording, Points)):
+        raise TypeError(f"expected a runout.Recording or runout.Points, found {type(data).__name__}")
     changes, found = named(overrides or {})
     lines = [f"{name}={_toml.value(of, name)}" for name, of in changes.items()]
     path, text, folder = None, "", "."
     if isinstance(pipeline, Pipeline):
         text, folder = pipeline.to_toml(), os.fspath(pipeline.folder)
         found += pipeline._named()[1]
-        if isinstance(pipeline.load, Recording) and recording is None:
-            recording = pipeline.load
+        if isinstance(pipeline.load, (Recording, Points)) and data is None:
+            data = pipeline.load
     elif isinstance(pipeline, Mapping):
         keys, own = named(pipeline)
         text = _toml.document(keys)
@@ -84,9 +88,15 @@ def job(
         path = os.fspath(pipeline)
     else:
         raise TypeError(f"expected a path, a dictionary or a runout.Pipeline, found {type(pipeline).__name__}")
-    if recording is not None:
+    stations, held = None, None
+    if isinstance(data, Recording):
         lines.append('load={ plugin = "arrays" }')
+        stations = data.stations
+    elif isinstance(data, Points):
+        held = tempfile.TemporaryDirectory(prefix="runout-")
+        file = os.path.join(held.name, "points.csv")
+        data.write(file)
+        lines.append(f"load={{ plugin = \"points\", path = {_toml.string(file, 'load')} }}")
     if isinstance(plugins, (str, Mapping)) or not isinstance(plugins, Iterable):
         raise TypeError(f"expected a list of plugins, found {type(plugins).__name__}")
-    stations = None if recording is None else recording.stations
-    return Job(path, text, folder, lines, stations, checked([*plugins, *found]))
+    return Job(path, text, folder, lines, stations, checked([*plugins, *found]), held)

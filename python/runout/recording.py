@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import csv
 import dataclasses
+import os
 from collections.abc import Mapping, Sequence
 from typing import Any, Union
 
@@ -14,9 +16,9 @@ from . import _native
 Array = npt.ArrayLike
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
+@dataclasses.dataclass(frozen=True)
 class Capture:
-    """One station in one setup.
+    """One station in one setup: `runout.Capture(samples, angle_deg=angle)` or `runout.Capture(samples, marks=marks)`.
 
     `samples` are in µm, `[sample, channel]`. Turns are known by `marks`, the (fractional) sample positions at which they begin, or
     by `angle_deg`, the unwrapped spindle angle of each sample. `sensors` names the channels; without it they are the rig's
@@ -24,6 +26,7 @@ class Capture:
     """
 
     samples: Array
+    _: dataclasses.KW_ONLY
     marks: Array | None = None
     angle_deg: Array | None = None
     sensors: Sequence[str] | None = None
@@ -84,6 +87,47 @@ class Recording:
         if not all(np.isfinite(station.z_mm) for station in stations.values()):
             raise ValueError("expected finite positions in z_mm")
         return cls(list(stations.values()))
+
+
+@dataclasses.dataclass(frozen=True)
+class Points:
+    """Measured points in memory, for a separator of points: columns with the names and units that `points` reads from a file."""
+
+    columns: dict[str, list[Any]]
+
+    @classmethod
+    def from_arrays(cls, columns: Mapping[str, Array] | None = None, **more: Array) -> Points:
+        """Points of columns of one length: `Points.from_arrays(angle_deg=a, x_um=x)`, or a dictionary or frame of them.
+
+        Numbers that are NaN or None were not measured; texts are names. Raises ValueError where the lengths differ.
+        """
+        given = {} if columns is None else {str(name): columns[name] for name in columns}
+        given |= more
+        if not given:
+            raise ValueError("expected columns of points, found none")
+        found = {name: _column(of, name) for name, of in given.items()}
+        lengths = {name: len(of) for name, of in found.items()}
+        if len(set(lengths.values())) != 1:
+            raise ValueError(f"expected columns of one length, found {lengths}")
+        return cls(found)
+
+    def write(self, path: Union[str, os.PathLike[str]]) -> None:
+        """Writes them as CSV, without loss: a number that was not measured is an empty cell."""
+        with open(path, "w", encoding="utf-8", newline="") as file:
+            rows = csv.writer(file)
+            rows.writerow(self.columns)
+            rows.writerows(zip(*self.columns.values()))
+
+
+def _column(given: Array, name: str) -> list[Any]:
+    array = np.asarray(given)
+    if array.ndim != 1 or not len(array):
+        raise ValueError(f"{name}: expected a column of at least one value, found the shape {array.shape}")
+    if array.dtype.kind in "fiu":
+        return ["" if value != value else repr(value) for value in array.tolist()]
+    if array.dtype.kind in "OUT" and all(value is None or isinstance(value, (str, float, int)) for value in array):
+        return ["" if value is None or value != value else str(value) for value in array.tolist()]
+    raise TypeError(f"{name}: expected numbers or texts, found {array.dtype}")
 
 
 def _capture(

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from . import _html
+from . import _html, _plot
 from ._native import Surface, Table, figures
 
 PANELS = 4
@@ -36,10 +36,17 @@ class Value:
     def __float__(self) -> float:
         return self.value
 
+    @property
+    def by(self) -> str:
+        """Reference and filter: "LSCI, gaussian 50 UPR"; empty where there are none."""
+        named = (self.facts.get("reference"), self.facts.get("filter"))
+        return ", ".join(str(name) for name in named if name and name != "none")
+
     def __str__(self) -> str:
         std = "" if self.std is None else f" ± {self.std:.2g}"
         at = "".join(f", {key} {name}" for key, name in self.where.items())
-        return f"{self.symbol} = {self.value:.6g}{std} {self.unit}{at}"
+        by = f" ({self.by})" if self.by else ""
+        return f"{self.symbol}{by} = {self.value:.6g}{std} {self.unit}{at}"
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
@@ -83,6 +90,18 @@ class _Outcome:
         std[order] = table["std"][of]
         return values, std
 
+    def plot(self, name: str = "form", **where: str) -> Any:
+        """A figure of a table, or of the id of one of its figures, by matplotlib: `result.plot("form", section="a", station="s001")`.
+
+        Without matplotlib it is the figure that `figures` gives, which a notebook shows, of all places. Raises LookupError where nothing
+        is drawn by the name or nothing is at the place.
+        """
+        try:
+            import matplotlib  # noqa: F401
+        except ImportError:
+            table, _ = _plot._found(self.tables, name)
+            return _html.Shown(figures([table], PANELS))
+        return _plot.draw(self.tables, name, where)
 
     def figures(self, panels: int = PANELS) -> str:
         """The figures of its tables as HTML: polar plots of form and error motion, harmonics, and those of its domain."""
@@ -135,14 +154,45 @@ class Result(_Outcome):
         found = [one for one in self.values if one.symbol == symbol and _is_at(one, where)]
         if len(found) == 1:
             return found[0]
-        symbols = sorted({one.symbol for one in self.values})
-        known = ", ".join(symbols) if not found else "; ".join(str(one) for one in found[:5])
-        raise LookupError(f"{len(found)} values are `{symbol}` with {where}, expected one; there is {known}")
+        if found:
+            apart = sorted({key for key in _APART if len({one.where.get(key, one.facts.get(key)) for one in found}) > 1})
+            known = "; ".join(map(str, found[:5])) + ("; …" if len(found) > 5 else "")
+            raise LookupError(f"{len(found)} values are `{symbol}` with {where}: say which {', '.join(apart)}. They are {known}")
+        same = "; ".join(str(one) for one in self.values if one.symbol == symbol) or ", ".join(sorted({one.symbol for one in self.values}))
+        raise LookupError(f"no value is `{symbol}` with {where}; there is {same}")
 
     def _repr_html_(self) -> str:
-        rows = ((one.symbol, one.value, one.std, one.unit, ", ".join(one.where.values())) for one in self.values)
-        values = _html.table(("value", "", "± (standard)", "unit", "of"), rows)
+        rows = ((one.symbol, one.by, one.value, one.std, one.unit, ", ".join(one.where.values())) for one in self.values)
+        values = _html.table(("value", "reference, filter", "", "± (standard)", "unit", "of"), rows)
         return _html.page(self.title, self.warnings, values, self.figures())
+
+
+_APART = ("station", "section", "of", "reference", "filter")
+
+
+def values(result: Result, symbol: str | None = None, **where: str) -> Any:
+    """The values of a result as a frame of pandas, or of polars where pandas is missing: one row a value.
+
+    `symbol` and `where` choose, as in `Result.value`: `runout.values(result, symbol="RONt", reference="LSCI")`.
+    """
+    found = [one for one in result.values if symbol in (None, one.symbol) and _is_at(one, where)]
+    low_high = [one.interval_95 or (None, None) for one in found]
+    columns: dict[str, list[Any]] = {
+        "symbol": [one.symbol for one in found],
+        **{key: [one.where.get(key) for one in found] for key in ("station", "section", "of")},
+        **{key: [one.facts.get(key) for one in found] for key in ("reference", "filter")},
+        "value": [one.value for one in found],
+        "std": [one.std for one in found],
+        "low_95": [low for low, _ in low_high],
+        "high_95": [high for _, high in low_high],
+        "unit": [one.unit for one in found],
+        "refuted_by": [one.facts.get("refuted_by") for one in found],
+    }
+    try:
+        import pandas as frames
+    except ImportError:
+        import polars as frames
+    return frames.DataFrame(columns)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -225,6 +275,78 @@ class Diagnosis(_Outcome):
         )
         effects = _html.table(("effect", "targets", "parameters", "confounded with"), found)
         return _html.page(f"Diagnosis: {self.verdict}", self.warnings, _html.table(head, levels), effects, self.figures())
+
+
+class _Document(dict[str, Any]):
+    """The document of a command, with what it says as properties."""
+
+    @property
+    def warnings(self) -> list[str]:
+        """What the user should know."""
+        return [str(text) for text in self.get("warnings", self.get("notes", []))]
+
+
+class Comparison(_Document):
+    """Methods on the same data: the document of `compare.schema.json`."""
+
+    @property
+    def methods(self) -> list[str]:
+        """The methods that took part, the reference first."""
+        return [str(one["method"]) for one in self["methods"]]
+
+    @property
+    def refused(self) -> dict[str, str]:
+        """Methods that could not take part, with the reason."""
+        return {str(one["method"]): str(one["reason"]) for one in self["refused"]}
+
+    @property
+    def rows(self) -> list[dict[str, Any]]:
+        """One row a quantity and method: root mean square and RONt with the largest E_n against the reference."""
+        return [
+            {"station": station["station"], "quantity": one["quantity"], "section": one["section"], "unit": one["unit"]}
+            | {key: of[key] for key in ("method", "rms", "ront_um", "std")}
+            | {"worst_e_n": worst.get(of["method"])}
+            for station in self["stations"]
+            for one in station["quantities"]
+            for worst in [{other["method"]: (other["worst"] or {}).get("e_n") for other in one["differences"]}]
+            for of in one["values"]
+        ]
+
+    def __repr__(self) -> str:
+        return f"<runout.Comparison: {', '.join(self.methods)}; refused: {', '.join(self.refused) or 'none'}>"
+
+    def _repr_html_(self) -> str:
+        rows = self.rows
+        head = list(rows[0]) if rows else []
+        return _html.page(f"Comparison: {self['title']}", self.warnings, _html.table(head, ([*row.values()] for row in rows)))
+
+
+class Plan(_Document):
+    """What a rig can separate and how well: the document of `plan.schema.json`."""
+
+    @property
+    def lost_orders(self) -> dict[str, list[int]]:
+        """Orders that the rig cannot separate, by what they are of."""
+        return dict(self.get("lost_orders") or {})
+
+    @property
+    def noise_gain(self) -> dict[int, float]:
+        """Noise of the form over that of one reading, by order."""
+        return {int(one["order"]): float(one["gain"]) for one in (self.get("noise_gain") or {}).get("form", [])}
+
+    @property
+    def blind_to(self) -> list[str]:
+        """Effects that data of this rig cannot show."""
+        return [" ".join([one["effect"], *one["targets"]]) for one in self.get("blind_to") or []]
+
+    def __repr__(self) -> str:
+        lost = "; ".join(f"{of} {orders}" for of, orders in self.lost_orders.items() if orders) or "none"
+        return f"<runout.Plan: lost orders: {lost}; not observable: {', '.join(self.blind_to) or 'none'}>"
+
+    def _repr_html_(self) -> str:
+        gain = _html.table(("order", "noise gain of the form"), self.noise_gain.items())
+        lost = _html.table(("lost orders of", ""), ((of, ", ".join(map(str, orders))) for of, orders in self.lost_orders.items()))
+        return _html.page("Plan", self.warnings, lost, gain, _html.table(("not observable",), ([one] for one in self.blind_to)))
 
 
 def _values(summary: dict[str, Any]) -> Iterator[Value]:

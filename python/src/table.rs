@@ -6,15 +6,21 @@ use arrow_array::{
     Array, BooleanArray, Float64Array, RecordBatch, RecordBatchIterator, StringArray, UInt32Array,
     ffi::FFI_ArrowSchema, ffi_stream::FFI_ArrowArrayStream,
 };
+use arrow_ipc::{reader::StreamReader, writer::StreamWriter};
 use arrow_schema::{ArrowError, Schema};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
-use pyo3::{exceptions::PyKeyError, prelude::*, types::PyCapsule};
+use pyo3::{
+    exceptions::PyKeyError,
+    prelude::*,
+    types::{PyBytes, PyCapsule, PyDict},
+};
 use runout_cli::Failure;
 use runout_core::{
     fault::known_names,
     surface,
-    table::{Kind, TableSpec},
+    table::{ColumnSpec, Figure, Kind, TableSpec},
 };
+use serde::{Deserialize, Serialize};
 
 use crate::failure::{exception, fault};
 
@@ -41,8 +47,96 @@ impl Table {
     }
 }
 
+/// What makes an object of a pickle, and what it is given.
+type Restored<'py, Given> = (Bound<'py, PyAny>, Given);
+
+/// A table's declaration as a pickle holds it.
+#[derive(Serialize, Deserialize)]
+struct Pickled {
+    name: String,
+    about: String,
+    columns: Vec<(char, bool, String, String, String)>,
+    figures: Vec<Figure>,
+}
+
+impl Pickled {
+    fn of(spec: &TableSpec) -> Self {
+        let columns = spec.columns.iter().map(|column| {
+            let kind = match column.kind {
+                Kind::Name => 'n',
+                Kind::Text => 't',
+                Kind::Number => 'x',
+                Kind::Count => 'c',
+                Kind::Flag => 'f',
+            };
+            (kind, column.nullable, column.name.clone(), column.unit.clone(), column.about.clone())
+        });
+        let columns = columns.collect();
+        Self { name: spec.name.clone(), about: spec.about.clone(), columns, figures: spec.figures.clone() }
+    }
+
+    fn spec(self) -> TableSpec {
+        let columns = self.columns.into_iter().map(|(kind, nullable, name, unit, about)| {
+            let column = match kind {
+                'n' => ColumnSpec::name(name, about),
+                't' => ColumnSpec::text(name, about),
+                'c' => ColumnSpec::count(name, unit, about),
+                'f' => ColumnSpec::flag(name, about),
+                _ => ColumnSpec::number(name, unit, about),
+            };
+            if nullable { column.or_null() } else { column }
+        });
+        let spec = TableSpec::new(self.name, self.about, columns.collect());
+        self.figures.into_iter().fold(spec, TableSpec::figure)
+    }
+}
+
 #[pymethods]
 impl Table {
+    /// A frame of pandas, with the units in its `attrs`.
+    fn to_pandas<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        let py = slf.py();
+        let (columns, units) = (PyDict::new(py), PyDict::new(py));
+        for column in &slf.get().spec.columns {
+            columns.set_item(&column.name, slf.get_item(&column.name)?)?;
+            units.set_item(&column.name, &column.unit)?;
+        }
+        let frame = py.import("pandas")?.getattr("DataFrame")?.call1((columns,))?;
+        frame.getattr("attrs")?.set_item("units", units)?;
+        Ok(frame)
+    }
+
+    /// A frame of polars, which shares its memory.
+    fn to_polars<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        slf.py().import("polars")?.getattr("DataFrame")?.call1((slf,))
+    }
+
+    /// What is drawn of it, as JSON: a list of figures.
+    #[getter]
+    fn drawings(&self) -> PyResult<String> {
+        serde_json::to_string(&self.spec.figures).map_err(|error| fault(&error.to_string()))
+    }
+
+    /// As a pickle holds it: its declaration, and its rows in Arrow's IPC.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Restored<'py, (String, Bound<'py, PyBytes>)>> {
+        let refuse = |error: ArrowError| fault(&error.to_string());
+        let table = slf.get();
+        let spec = serde_json::to_string(&Pickled::of(&table.spec)).map_err(|error| fault(&error.to_string()))?;
+        let mut writer = StreamWriter::try_new(Vec::new(), &table.schema()).map_err(refuse)?;
+        table.batches.iter().try_for_each(|batch| writer.write(batch)).map_err(refuse)?;
+        let rows = writer.into_inner().map_err(refuse)?;
+        Ok((slf.get_type().getattr("_restored")?, (spec, PyBytes::new(slf.py(), &rows))))
+    }
+
+    /// A table of what a pickle holds.
+    #[staticmethod]
+    fn _restored(spec: &str, rows: &[u8]) -> PyResult<Self> {
+        let refuse = |error: ArrowError| fault(&error.to_string());
+        let spec: Pickled = serde_json::from_str(spec).map_err(|error| fault(&error.to_string()))?;
+        let batches = StreamReader::try_new(rows, None).map_err(refuse)?.collect::<Result<_, _>>().map_err(refuse)?;
+        Ok(Self::new(spec.spec(), batches))
+    }
+
     #[getter]
     fn name(&self) -> &str {
         &self.spec.name
@@ -136,7 +230,31 @@ pub(crate) struct Surface {
     /// Deviation from the nominal radius in µm, `[ring, angle]`.
     deviation_um: Py<PyArray2<f64>>,
     /// How the rings were filled between the sections.
-    interpolation: &'static str,
+    interpolation: String,
+}
+
+/// The fields of a surface, as a pickle holds them.
+type Fields = (f64, Py<PyArray1<f64>>, Py<PyArray1<f64>>, Py<PyArray2<f64>>, String);
+
+#[pymethods]
+impl Surface {
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Restored<'py, Fields>> {
+        let (py, of) = (slf.py(), slf.get());
+        let [angle_deg, z_mm] = [&of.angle_deg, &of.z_mm].map(|array| array.clone_ref(py));
+        let fields = (of.radius_mm, angle_deg, z_mm, of.deviation_um.clone_ref(py), of.interpolation.clone());
+        Ok((slf.get_type().getattr("_restored")?, fields))
+    }
+
+    #[staticmethod]
+    fn _restored(
+        radius_mm: f64,
+        angle_deg: Py<PyArray1<f64>>,
+        z_mm: Py<PyArray1<f64>>,
+        deviation_um: Py<PyArray2<f64>>,
+        interpolation: String,
+    ) -> Self {
+        Self { radius_mm, angle_deg, z_mm, deviation_um, interpolation }
+    }
 }
 
 impl Surface {
@@ -153,7 +271,7 @@ impl Surface {
             angle_deg: PyArray1::from_vec(py, angle_deg).unbind(),
             z_mm: PyArray1::from_vec(py, surface.z_mm).unbind(),
             deviation_um: deviation_um.unbind(),
-            interpolation: surface.interpolation,
+            interpolation: surface.interpolation.to_owned(),
         })
     }
 }

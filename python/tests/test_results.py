@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+import pickle
+
 import numpy as np
 import pytest
 
@@ -93,3 +96,57 @@ def test_a_notebook_shows_it(result: runout.Result) -> None:
     assert page.count("<img") >= 2 and "data:image/svg+xml;base64," in page
     assert "<table>" in page and "RONt" in page and "Turned shaft" in page
     assert "<b>" not in runout.Result('{"title": "<b>", "warnings": [], "stations": [], "values": []}', [], None)._repr_html_()
+
+
+def test_tables_become_frames(result: runout.Result) -> None:
+    pandas, polars = pytest.importorskip("pandas"), pytest.importorskip("polars")
+    form = result.tables["form"]
+    frame = form.to_pandas()
+    assert list(frame.columns) == [name for name, _, _ in form.columns] and len(frame) == len(form)
+    assert frame.attrs["units"]["form_um"] == "um"
+    assert np.array_equal(frame["form_um"], form.to_polars()["form_um"].to_numpy(), equal_nan=True)
+    assert isinstance(frame, pandas.DataFrame) and isinstance(form.to_polars(), polars.DataFrame)
+
+
+def test_values_are_a_frame(result: runout.Result) -> None:
+    pytest.importorskip("pandas")
+    frame = runout.values(result, symbol="RONt", reference="LSCI", filter="none")
+    assert len(frame) == 6 and set(frame["section"]) == {"a", "b"} and (frame["std"] > 0).all()
+    first = frame.iloc[0]
+    assert first["value"] == result.value("RONt", section=first["section"], station=first["station"], reference="LSCI", filter="none").value
+    assert len(runout.values(result)) == len(result.values)
+
+
+def test_a_value_that_is_not_one_says_what_sets_them_apart(result: runout.Result) -> None:
+    with pytest.raises(LookupError, match="say which .*filter.*reference.*section.*station"):
+        result.value("RONt")
+    with pytest.raises(LookupError, match="no value is `RONt` .*there is RONt .LSCI"):
+        result.value("RONt", section="c")
+
+
+def test_results_travel_between_processes(result: runout.Result) -> None:
+    same = pickle.loads(pickle.dumps(result))
+    assert same.summary == result.summary and list(same.tables) == list(result.tables)
+    for name, table in result.tables.items():
+        assert same.tables[name].columns == table.columns and same.tables[name].drawings == table.drawings
+        assert same.tables[name].to_polars().equals(table.to_polars())
+    assert same.surface is not None and np.array_equal(same.surface.deviation_um, result.surface.deviation_um)
+    assert "RONt" in same._repr_html_()
+
+
+def test_tables_are_drawn(result: runout.Result) -> None:
+    station = result.summary["stations"][0]["station"]
+    pytest.importorskip("matplotlib")
+    figure = result.plot("form", section="a", station=station)
+    (axes,) = figure.axes
+    form = result.tables["form"]
+    rows = (np.array(form["section"]) == "a") & (np.array(form["station"]) == station)
+    (line,) = (one for one in axes.lines if len(one.get_ydata()) == rows.sum())
+    assert axes.name == "polar" and np.array_equal(line.get_ydata(), form["form_um"][rows]) and "µm" in axes.get_ylabel()
+    for name in result.tables:
+        if json.loads(result.tables[name].drawings):
+            assert result.plot(name).axes
+    with pytest.raises(LookupError, match="there is form"):
+        result.plot("nothing")
+    with pytest.raises(LookupError, match="no rows"):
+        result.plot("form", section="c")

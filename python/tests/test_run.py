@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import csv
 import json
+import pickle
 import subprocess
 import sys
 import threading
@@ -19,6 +21,9 @@ from runout.preprocessors import LowPass, SynchronousAverage, Trim
 from runout.separators import FourSensorReversal
 
 from conftest import EXAMPLE, RIG, pipeline, small_pipeline, small_recording, turns
+
+PROBE = EXAMPLE.parent / "15-touch-probe"
+SETUPS = [{"id": "r0"}, {"id": "r100", "ring_deg": 100.0}, {"id": "r217", "ring_deg": 217.0}]
 
 
 def program(*words: object) -> subprocess.CompletedProcess[str]:
@@ -215,3 +220,50 @@ def test_the_program_is_in_the_package() -> None:
     assert "runout" in program("--version").stdout
     assert program("run", "nothing.toml").returncode == 2
     assert program("walk").returncode == 2
+
+
+def test_points_in_memory_are_those_of_a_file() -> None:
+    with open(PROBE / "touches.csv", encoding="utf-8", newline="") as file:
+        rows = list(csv.reader(line for line in file if not line.startswith("#")))
+    columns = {name: [row[place] for row in rows[1:]] for place, name in enumerate(rows[0])}
+    given = {name: of if any(not _is_number(one) for one in of) else np.array(of, dtype=float) for name, of in columns.items()}
+    keys = {"separate": {"plugin": "touch-probe", "ring_radius_mm": 25.0, "max_order": 15, "setups": SETUPS}}
+    of_file = runout.run(keys | {"load": {"plugin": "points", "path": str(PROBE / "touches.csv")}})
+    points = runout.Points.from_arrays(given)
+    of_arrays = runout.run(keys | {"load": {"plugin": "arrays"}}, points)
+    assert of_arrays.summary["values"] == of_file.summary["values"]
+    built = runout.Pipeline(load=points, separate=keys["separate"])
+    assert len(runout.run(built).values) == len(of_file.values)
+    assert runout.diagnose(built).verdict == runout.diagnose(keys | {"load": {"plugin": "points", "path": str(PROBE / "touches.csv")}}).verdict
+
+
+def test_points_that_cannot_be_are_refused() -> None:
+    with pytest.raises(ValueError, match="one length"):
+        runout.Points.from_arrays(x_mm=[1.0, 2.0], y_mm=[1.0])
+    with pytest.raises(ValueError, match="found none"):
+        runout.Points.from_arrays({})
+    with pytest.raises(ValueError, match="a column"):
+        runout.Points.from_arrays(x_mm=np.zeros((2, 2)))
+    with pytest.raises(TypeError, match="numbers or texts"):
+        runout.Points.from_arrays(x_mm=np.array([1j]))
+
+
+def test_a_comparison_and_a_plan_say_what_is_in_them(arrays: runout.Recording) -> None:
+    comparison = runout.compare(pipeline(), ["harmonic-least-squares"], arrays)
+    assert comparison.methods == ["four-sensor-reversal", "harmonic-least-squares"] and comparison.refused == {}
+    row = comparison.rows[0]
+    assert row["method"] == "four-sensor-reversal" and row["quantity"] == "form" and row["rms"] > 0
+    assert any(row["worst_e_n"] is not None for row in comparison.rows)
+    assert "Comparison" in comparison._repr_html_() and "four-sensor" in repr(comparison)
+    plan = runout.plan(RIG, orders=(2, 20))
+    assert plan.lost_orders == plan["lost_orders"] and set(plan.noise_gain) == set(range(2, 21))
+    assert "Plan" in plan._repr_html_() and repr(plan).startswith("<runout.Plan: lost orders: ")
+    assert pickle.loads(pickle.dumps(comparison)) == comparison
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True

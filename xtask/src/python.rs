@@ -14,11 +14,12 @@ use crate::{
 
 /// What builds the package, and what its tests take.
 const BUILD: &str = "maturin>=1.9,<2";
-const TEST_PACKAGES: [&str; 15] = [
+const TEST_PACKAGES: [&str; 16] = [
     "dask",
     "duckdb",
     "h5py",
     "ipykernel",
+    "matplotlib",
     "moto[server]",
     "mypy",
     "nbclient",
