@@ -18,7 +18,7 @@ use crate::{
 /// # Errors
 /// When a check of the pipeline fails.
 pub fn check(sources: &Sources, pipeline: &Pipeline, registry: &Registry) -> Result<Value, Failure> {
-    to_value(&checking::report(sources, pipeline, &registry.effects)?)
+    to_value(&checking::report(sources, pipeline, &registry.effects)?.0)
 }
 
 /// The document of `plan`, `simulate` or `inspect`, by the words of its command line without the program's name.

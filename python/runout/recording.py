@@ -21,7 +21,7 @@ class Capture:
     """One station in one setup: `runout.Capture(samples, angle_deg=angle)` or `runout.Capture(samples, marks=marks)`.
 
     `samples` are in µm, `[sample, channel]`. Turns are known by `marks`, the (fractional) sample positions at which they begin, or
-    by `angle_deg`, the unwrapped spindle angle of each sample. `sensors` names the channels; without it they are the rig's
+    by `angle_deg`, the spindle angle of each sample, which may begin anew each turn. `sensors` names the channels; without it they are the rig's
     sensors in their order.
     """
 
@@ -141,7 +141,7 @@ def _capture(
     if samples.ndim == 1:
         samples = samples.reshape(-1, 1)
     marks = None if given.marks is None else _numbers(given.marks, place, "marks", (1,))
-    angle = None if given.angle_deg is None else _numbers(given.angle_deg, place, "angle_deg", (1,))
+    angle = None if given.angle_deg is None else _unwrapped(_numbers(given.angle_deg, place, "angle_deg", (1,)))
     named = sensors if given.sensors is None else given.sensors
     if isinstance(named, str):
         raise TypeError(f"{place}: expected a list of sensor ids, found a string")
@@ -156,6 +156,12 @@ def _capture(
         )
     except ValueError as error:
         raise ValueError(f"{place}: {error}") from None
+
+
+def _unwrapped(angle_deg: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """The angle itself where it goes on over the turns; unwrapped where it begins anew each turn."""
+    wrapped = angle_deg.size > 1 and np.ptp(angle_deg) <= 360 and np.abs(np.diff(angle_deg)).max() > 180
+    return np.unwrap(angle_deg, period=360.0) if wrapped else angle_deg
 
 
 def _numbers(given: Array, place: str, name: str, dimensions: tuple[int, ...]) -> npt.NDArray[np.float64]:

@@ -267,3 +267,15 @@ def _is_number(text: str) -> bool:
     except ValueError:
         return False
     return True
+
+
+def test_an_angle_may_begin_anew_each_turn() -> None:
+    samples, _ = turns()
+    angle = np.arange(len(samples)) * 360.0 / 128 + 10
+    values = []
+    for given in (angle, np.mod(angle, 360), np.mod(angle + 180, 360) - 180):
+        captures = {setup: {"s1": runout.Capture(samples, angle_deg=given)} for setup in ("initial", "reversed")}
+        recording = runout.Recording.from_arrays(captures, sample_rate_hz=1280.0)
+        values.append(runout.run(small_pipeline(), recording).value("RONt", section="a", reference="LSCI", filter="none").value)
+    # An angle from -180 on counts its turns from another sample.
+    assert values[1] == pytest.approx(values[0], rel=1e-9) and values[2] == pytest.approx(values[0], rel=0.1)

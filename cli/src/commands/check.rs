@@ -1,6 +1,7 @@
-//! `runout check`: everything that can be said without the data.
+//! `runout check`: everything that can be said before a run.
 
 use runout_core::{
+    Error, ErrorKind,
     effects::EffectCatalogue,
     mains,
     pipeline::{
@@ -16,25 +17,30 @@ use super::{pipeline, print};
 use crate::{
     args::PipelineArgs,
     failure::Failure,
-    render,
-    reports::check::{OfPoints, Report, RigSize, Separability, Stage, TakenColumn},
+    render::{self, count},
+    reports::check::{Data, OfPoints, Report, RigSize, Separability, Stage, TakenColumn},
 };
 
 /// Checks a pipeline and says what it can do.
 ///
 /// # Errors
-/// When the configuration is wrong.
+/// When the configuration is wrong, and when the data are there and do not fit it, after the report.
 pub(crate) fn execute(args: &PipelineArgs, json: bool, registry: &Registry) -> Result<(), Failure> {
     let (sources, pipeline) = pipeline(args, registry)?;
-    let report = report(&sources, &pipeline, &registry.effects)?;
-    print(&report, json, render::check::text)
+    let (report, refused) = report(&sources, &pipeline, &registry.effects)?;
+    print(&report, json, render::check::text)?;
+    refused.map_or(Ok(()), |error| Err(error.into()))
 }
 
-/// What can be said of a pipeline.
+/// What can be said of a pipeline, and why data that are there cannot be used.
 ///
 /// # Errors
 /// When a check of it fails.
-pub(crate) fn report(sources: &Sources, pipeline: &Pipeline, effects: &EffectCatalogue) -> Result<Report, Failure> {
+pub(crate) fn report(
+    sources: &Sources,
+    pipeline: &Pipeline,
+    effects: &EffectCatalogue,
+) -> Result<(Report, Option<Error>), Failure> {
     let mut notes = pipeline.assessment.as_ref().map(|assessment| assessment.notes.clone()).unwrap_or_default();
     notes.extend(pipeline.rig.as_ref().map(Rig::remarks).unwrap_or_default());
     let source = pipeline.loader.open(&pipeline.request());
@@ -44,8 +50,14 @@ pub(crate) fn report(sources: &Sources, pipeline: &Pipeline, effects: &EffectCat
             let setups = pipeline.rig.as_ref().map_or(0, |rig| rig.setups.len());
             notes.extend(mains::whole_orders(&captures_sampled(&**recording, setups)));
         }
-        Err(error) => notes.push(format!("the data are not there yet, or cannot be used: {error}")),
+        Err(_) => {}
     }
+    let amount = source.as_ref().map_err(Error::clone).and_then(|source| amount(source, pipeline.rig.as_ref()));
+    let (data, refused) = match amount {
+        Ok(about) => (Data::Usable { about }, None),
+        Err(error) if error.kind() == ErrorKind::MissingFile => (Data::Missing { about: error.to_string() }, None),
+        Err(error) => (Data::Unusable { about: error.to_string() }, Some(error)),
+    };
     if !pipeline.checks.is_empty() {
         let speeds_rpm = match &source {
             Ok(Source::Turns(recording)) => {
@@ -66,8 +78,9 @@ pub(crate) fn report(sources: &Sources, pipeline: &Pipeline, effects: &EffectCat
         Route::Turns { separator, .. } => separator.foresee(effects).transpose()?,
         Route::Points { .. } => None,
     };
-    Ok(Report {
+    let report = Report {
         title: pipeline.title.clone(),
+        data,
         stages: stages(sources)?,
         rig: pipeline.rig.as_ref().map(RigSize::from),
         separability: pipeline.assessment.as_ref().map(|found| Separability::new(found, pipeline.rig.as_ref())),
@@ -77,7 +90,34 @@ pub(crate) fn report(sources: &Sources, pipeline: &Pipeline, effects: &EffectCat
         evaluables: pipeline.route.evaluables().into_iter().map(EvaluableKind::name).collect(),
         tables: pipeline.tables.iter().map(|table| table.name.clone()).collect(),
         notes,
-    })
+    };
+    Ok((report, refused))
+}
+
+/// How much the data hold: points, or stations with the turns of the first one in every setup.
+fn amount(source: &Source, rig: Option<&Rig>) -> Result<String, Error> {
+    let recording = match source {
+        Source::Points(points) => {
+            let rows = points.columns.first().map_or(0, |column| column.values.len());
+            return Ok(format!("{} with {} columns", count(rows, "point"), points.columns.len() + points.labels.len()));
+        }
+        Source::Turns(recording) => recording,
+    };
+    let setups = rig.map_or(&[][..], |rig| &rig.setups);
+    let mut turns = Vec::new();
+    for (index, setup) in setups.iter().enumerate() {
+        let stream = recording.open(0, index)?;
+        let capture = stream.capture();
+        let Some(whole @ 1..) = capture.marks.len().checked_sub(1) else {
+            let found = format!("expected marks of at least one turn, found {}", count(capture.marks.len(), "mark"));
+            return Err(Error::new("check", capture.object.clone(), found)
+                .of(ErrorKind::InsufficientData)
+                .help("the turns are found by the mark or the angle of the loader: see its keys by `runout plugins`"));
+        };
+        turns.push(format!("{whole} in {}", setup.id));
+    }
+    let stations = count(recording.stations().len(), "station");
+    Ok(format!("{stations}, turns of the first one: {}", turns.join(", ")))
 }
 
 fn stages(sources: &Sources) -> Result<Vec<Stage>, Failure> {

@@ -1,4 +1,4 @@
-//! What can be said without the data, for people.
+//! What can be said before a run, for people.
 
 use std::collections::BTreeMap;
 
@@ -10,7 +10,7 @@ use super::{
     page::Page,
     table::Table,
 };
-use crate::reports::check::{Order, Report, RigSize, Separability, Unknown};
+use crate::reports::check::{Data, Order, Report, RigSize, Separability, Unknown};
 
 /// The text of a report.
 #[must_use]
@@ -18,6 +18,11 @@ pub(crate) fn text(report: &Report) -> String {
     let mut page = Page::default();
     page.line(&report.title);
     page.line("The configuration is valid.");
+    match &report.data {
+        Data::Usable { about } => page.line(format_args!("The data can be used: {about}.")),
+        Data::Missing { about } => page.line(format_args!("The data are not there yet: {about}.")),
+        Data::Unusable { about } => page.line(format_args!("! The data cannot be used: {about}.")),
+    }
     let mut stages = Table::new(2, ["stage", "plugin"]);
     for stage in &report.stages {
         stages.row([stage.stage, &stage.plugin]);

@@ -16,6 +16,8 @@ use serde::Serialize;
 pub(crate) struct Report {
     /// The pipeline's title.
     pub title: String,
+    /// Whether the data are there and can be used.
+    pub data: Data,
     /// The plugins in the order in which data meet them.
     pub stages: Vec<Stage>,
     /// The rig in numbers, where there is one.
@@ -39,6 +41,27 @@ pub(crate) struct Report {
     pub tables: Vec<String>,
     /// What the user should know.
     pub notes: Vec<String>,
+}
+
+/// The data that the pipeline names: names of sensors, setups and columns are compared with it, and marks are counted.
+#[derive(Debug, Serialize, JsonSchema)]
+#[serde(tag = "state", rename_all = "kebab-case")]
+pub(crate) enum Data {
+    /// They are there and hold what is wanted.
+    Usable {
+        /// How much there is.
+        about: String,
+    },
+    /// There is no such file yet.
+    Missing {
+        /// Which.
+        about: String,
+    },
+    /// They are there and cannot be used: the command ends with an error.
+    Unusable {
+        /// Why not.
+        about: String,
+    },
 }
 
 /// What can be said of measured points.

@@ -134,6 +134,11 @@ impl Limit {
     }
 }
 
+/// Samples a turn whose orders hold all that a Gaussian filter passes by more than a thousandth: 2^−(n/n_c)² of order n (ISO 16610-21, 4.3).
+fn samples_for(cut_off_upr: usize) -> usize {
+    2 * (1000_f64.log2().sqrt() * cut_off_upr as f64).ceil() as usize
+}
+
 /// What of a value's band is not in it.
 fn missing(value: &Value) -> Option<String> {
     if let [first, others @ ..] = &value.lost_orders[..] {
@@ -144,9 +149,14 @@ fn missing(value: &Value) -> Option<String> {
         return Some(format!("order {first} {of_band} not observable"));
     }
     if let Some(order) = value.absent_above_upr {
-        return Some(format!(
-            "its filter passes more than a thousandth above order {order}, the highest that there is"
-        ));
+        let said = format!("its filter passes more than a thousandth above order {order}, the highest that there is");
+        let cut_off = value.band_upr[1];
+        let remedy = value.filter.starts_with("Gaussian") && cut_off < order;
+        return Some(if remedy {
+            format!("{said}: `samples_per_rev` ≥ {} holds all", samples_for(cut_off))
+        } else {
+            said
+        });
     }
     let above = value.weakened_above_upr?;
     Some(format!("of its band, a low-pass has weakened what is above {above:.1} undulations"))

@@ -26,6 +26,7 @@ pub struct CsvConfig {
     /// The axial stations.
     pub stations: Vec<StationConfig>,
     /// Paths of the files, relative to the TOML, with `{setup}` and `{station}` in the place of their names.
+    #[serde(alias = "path")]
     pub pattern: Option<String>,
     /// The files one by one, instead of a pattern.
     #[serde(default)]

@@ -69,7 +69,7 @@ impl From<Diagnostic> for ConfigError {
 
 impl Sources {
     /// Reads a file, with overrides of the form `key.path=value`. Where the top-level `include_key` holds a string, it
-    /// names a file (relative to this one) that replaces the table.
+    /// names a file (relative to this one; of an override, else relative to the working folder) that replaces the table.
     ///
     /// # Errors
     /// When a file cannot be read, or is not TOML where it has to be looked into.
@@ -107,8 +107,11 @@ impl Sources {
             let line = if bare { format!("value = {value:?}") } else { format!("value = {value}") };
             sources.add(&format!("--set {assignment}"), Role::Override(path.to_owned()), &line);
         }
-        if let Some(included) = sources.included(include_key)? {
-            let path = sources.folder.join(&included);
+        if let Some((included, is_override)) = sources.included(include_key)? {
+            let beside = sources.folder.join(&included);
+            // What is written on a command line may be meant from where it is typed.
+            let typed = is_override && !beside.exists() && Path::new(&included).exists();
+            let path = if typed { PathBuf::from(included) } else { beside };
             sources.add(&path.display().to_string(), Role::Include(include_key.to_owned()), &read_text(&path)?);
         }
         Ok(sources)
@@ -136,15 +139,18 @@ impl Sources {
         self.parts.push(Part { name: name.into(), role, padded: " ".repeat(start) + text, start });
     }
 
-    fn included(&self, key: &str) -> Result<Option<String>, ConfigError> {
+    /// The file that a key names, and whether an override does.
+    fn included(&self, key: &str) -> Result<Option<(String, bool)>, ConfigError> {
         let string = |table: &Table, key: &str| {
             table.get_ref().get(key).and_then(|value| value.get_ref().as_str().map(str::to_owned))
         };
         let mut found = None;
         for part in &self.parts {
             match &part.role {
-                Role::Main => found = string(&self.parse(part)?, key),
-                Role::Override(path) if path == key => found = string(&self.parse(part)?, "value"),
+                Role::Main => found = string(&self.parse(part)?, key).map(|file| (file, false)),
+                Role::Override(path) if path == key => {
+                    found = string(&self.parse(part)?, "value").map(|file| (file, true));
+                }
                 _ => {}
             }
         }
