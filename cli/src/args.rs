@@ -47,6 +47,8 @@ pub(crate) enum Command {
     Inspect(InspectArgs),
     /// Write a pipeline to start from, for a method and, where it is given, a file.
     New(NewArgs),
+    /// Write an example, a pipeline with its data, or list them.
+    Example(ExampleArgs),
     /// Write a height map or a profile in another format (X3P, SDF, HDF5).
     Convert(ConvertArgs),
     /// Print the completion script of a shell.
@@ -300,6 +302,16 @@ pub(crate) struct NewArgs {
     /// Write over a pipeline that is there.
     #[arg(long)]
     pub overwrite: bool,
+}
+
+/// `runout example`.
+#[derive(Debug, Args)]
+pub(crate) struct ExampleArgs {
+    /// Which one; without it they are listed.
+    pub name: Option<String>,
+    /// The folder to write; one of its name without it.
+    #[arg(long, value_name = "FOLDER")]
+    pub out: Option<PathBuf>,
 }
 
 /// `runout convert`.

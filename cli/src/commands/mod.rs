@@ -6,6 +6,7 @@ pub(crate) mod compare;
 pub(crate) mod completions;
 pub(crate) mod convert;
 pub(crate) mod diagnose;
+pub(crate) mod example;
 pub(crate) mod inspect;
 pub(crate) mod new;
 pub(crate) mod plan;
@@ -41,6 +42,7 @@ pub(crate) fn execute(command: Command, json: bool, registry: &Registry) -> Resu
         Command::Schema(args) => schema::execute(&args, json, registry),
         Command::Inspect(args) => inspect::execute(&args, json),
         Command::New(args) => new::execute(&args, json, registry),
+        Command::Example(args) => example::execute(&args, json),
         Command::Convert(args) => convert::execute(&args, json),
         Command::Report(args) => report::execute(&args, json),
         Command::Completions(args) => completions::execute(&args, json),

@@ -70,7 +70,10 @@ fn a_recording_of_channels_is_read_by_the_pipeline_that_is_made_for_it() {
     let text = fs::read_to_string(folder.path().join("donaldson-reversal.toml")).unwrap();
     assert!(text.contains("channels = { S1 = \"A\" }") && text.contains("does not have: \"B\", \"C\""), "{text}");
     assert!(text.contains("with a file for each setup"), "{text}");
-    assert_eq!(folder.run(&["check", "donaldson-reversal.toml"]).status, 0);
+    // The file holds one setup: the pipeline is valid, and the data do not fit it yet.
+    let checked = folder.run(&["check", "donaldson-reversal.toml"]);
+    assert!(checked.status == 1 && checked.stdout.contains("The configuration is valid."), "{}", checked.shown());
+    assert!(checked.stdout.contains("! The data cannot be used"), "{}", checked.shown());
 }
 
 #[test]
@@ -88,4 +91,25 @@ fn maps_and_points_are_read_by_their_loaders() {
     assert!(refused.status == 1 && refused.stderr.contains("no height map"), "{}", refused.stderr);
     let missing = folder.run(&["new", "axial-reversal", "there-is-none.csv", "--out", "x.toml"]);
     assert!(missing.status == 1 && missing.stderr.contains("no such file"), "{}", missing.stderr);
+}
+
+/// Each example that the program holds runs in a folder of its own.
+#[test]
+fn examples_that_the_program_holds_run() {
+    let folder = Folder::with(&[]);
+    let listed = folder.run(&["example", "--json"]);
+    let listed: serde_json::Value = serde_json::from_str(&listed.stdout).unwrap();
+    let names: Vec<&str> = listed["examples"].as_array().unwrap().iter().map(|one| one[0].as_str().unwrap()).collect();
+    assert_eq!(names, ["three-point", "r-test", "touch-probe", "spatial-error"]);
+    for name in names {
+        let written = folder.run(&["example", name]);
+        assert_eq!(written.status, 0, "{}", written.stderr);
+        let run = folder.run(&["run", &format!("{name}/pipeline.toml")]);
+        assert_eq!(run.status, 0, "{name}: {}", run.stderr);
+        assert!(run.stdout.contains("Key values"), "{name}: {}", run.stdout);
+    }
+    let again = folder.run(&["example", "r-test"]);
+    assert!(again.status == 2 && again.stderr.contains("is there already"), "{}", again.stderr);
+    let unknown = folder.run(&["example", "threepoint"]);
+    assert!(unknown.status == 2 && unknown.stderr.contains("did you mean `three-point`"), "{}", unknown.stderr);
 }
