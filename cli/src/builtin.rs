@@ -19,6 +19,7 @@ pub fn registry() -> Registry {
         runout_quadrature::register,
         runout_rotary_axis::register,
         runout_touch_probe::register,
+        runout_machine_tests::register,
         runout_rotor::register,
         runout_spatial_error::register,
         runout_fly_cutting::register,

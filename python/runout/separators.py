@@ -286,6 +286,40 @@ class TouchProbe:
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
+class Positioning:
+    """Accuracy and repeatability of positioning of one axis by ISO 230-2: A, E, R, B, M"""
+
+    plugin: ClassVar[str] = "positioning"
+
+    axis: str
+    """The axis, as the values name it: "X", "C"."""
+
+    rotary: Union[bool, None] = None
+    """Whether it is a rotary axis: its columns are then `target_deg` and `deviation_arcsec`. Default: false."""
+
+    scale_std_ppm: Union[float, None] = None
+    """Standard uncertainty of the scale, by the instrument's certificate and the temperatures: µm/m, of a rotary axis 10⁻⁶ of the
+    angle. Default: 0.0."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Circular:
+    """Circular deviation, radial deviation and hysteresis of a circular path by ISO 230-4: G, F, H, D"""
+
+    plugin: ClassVar[str] = "circular"
+
+    plane: str
+    """The plane of the path, as the values name it: "XY"."""
+
+    radius_mm: float
+    """Nominal radius of the path, in mm."""
+
+    radius_std_um: Union[float, None] = None
+    """Standard uncertainty of the instrument's length, in µm: 0 where it was not calibrated, and D and F say nothing of the radius
+    itself. Default: 0.0."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
 class RotorModes:
     """Natural frequencies, Campbell diagram and critical speeds of a rotor"""
 

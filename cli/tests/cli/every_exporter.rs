@@ -82,6 +82,24 @@ fn quadrature() -> Domain {
     Domain { name: "quadrature", pipeline: pipeline.into(), files: vec![("pairs.csv", pairs)], has_surface: false }
 }
 
+fn positioning() -> Domain {
+    let mut approaches = String::from("target_mm,deviation_um,direction\n");
+    for index in 0..60 {
+        let (target, direction) = (index % 6, if index / 6 % 2 == 0 { 1 } else { -1 });
+        let noise = 0.01 * f64::from((index * 29) % 23);
+        let deviation = 0.3 * f64::from(target) + 0.2 * f64::from(direction) + noise;
+        writeln!(approaches, "{},{deviation},{direction}", 50 * target).unwrap();
+    }
+    let pipeline =
+        "[load]\nplugin = 'points'\npath = 'approaches.csv'\n[separate]\nplugin = 'positioning'\naxis = 'X'\n";
+    Domain {
+        name: "positioning",
+        pipeline: pipeline.into(),
+        files: vec![("approaches.csv", approaches)],
+        has_surface: false,
+    }
+}
+
 fn rotary_axis() -> Domain {
     let scenario = R_TEST.replace("step_deg = 10, count = 36", "step_deg = 30, count = 12");
     Domain {
@@ -185,6 +203,7 @@ fn every_exporter_writes_every_domain_or_is_refused_in_words() {
         cylinder(),
         straightness(),
         quadrature(),
+        positioning(),
         rotary_axis(),
         touch_probe(),
         spatial_error(),

@@ -1,0 +1,311 @@
+//! The separator `circular`: a circular path, as a ball bar or a grid encoder records it (ISO 230-4, clause 3).
+//!
+//! | symbol | value |
+//! | --- | --- |
+//! | `G+`, `G-` | circular deviation of the counter-clockwise and of the clockwise path: distance of the two concentric circles that enclose it at the least distance |
+//! | `G_b` | bidirectional circular deviation: the same of both paths together |
+//! | `H` | hysteresis: largest radial distance of the two paths at one angle |
+//! | `D` | mean bidirectional radial deviation: radius of the least-squares circle of both paths less the nominal one |
+//! | `F_max`, `F_min` | largest and smallest radial deviation from the nominal circle about the centre of the least-squares circle |
+//!
+//! Paths are means over the turns of each direction, at equal angles. Uncertainties are those that the turns show, order by order; `radius_std_um`, that of the instrument's length, is in D and F.
+
+use std::f64::consts::TAU;
+
+use runout_core::{
+    Complex64, Result,
+    draws::{seed, stands_out},
+    fault::Fault,
+    numerics::fourier::Fourier,
+    pipeline::{Context, StageConfig},
+    points::{PointColumn, PointKind::Number, Points},
+    stage::{Outcome, PointSeparator, Separator},
+    standards::roundness::{self, Angles, Reference},
+    table::{ColumnSpec, Figure, Measure, TableRows, TableSpec, numbers, texts},
+};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use crate::{
+    draws::{Computed, Draw, Machine, with_uncertainty, without_noise},
+    paths::{ANGLES, Paths, mean_of, refused},
+};
+
+/// `[separate] plugin = "circular"`.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CircularConfig {
+    /// The plane of the path, as the values name it: "XY".
+    pub plane: String,
+    /// Nominal radius of the path, in mm.
+    pub radius_mm: f64,
+    /// Standard uncertainty of the instrument's length, in µm: 0 where it was not calibrated, and D and F say nothing of the radius itself.
+    #[serde(default)]
+    pub radius_std_um: f64,
+}
+
+impl StageConfig for CircularConfig {
+    type Stage = Separator;
+
+    const NAME: &'static str = "circular";
+    const ABOUT: &'static str =
+        "circular deviation, radial deviation and hysteresis of a circular path by ISO 230-4: G, F, H, D";
+
+    fn check(self, _context: &Context) -> std::result::Result<Self::Stage, Fault> {
+        if !(self.radius_mm.is_finite() && self.radius_mm > 0.0) {
+            return Err(Fault::at("radius_mm", format!("expected a radius above 0 mm, found {}", self.radius_mm)));
+        }
+        if !(self.radius_std_um.is_finite() && self.radius_std_um >= 0.0) {
+            return Err(Fault::at("radius_std_um", format!("expected at least 0 µm, found {}", self.radius_std_um)));
+        }
+        Ok(Separator::Points(Box::new(Circular(self))))
+    }
+}
+
+struct Circular(CircularConfig);
+
+const COLUMNS: [PointColumn; 3] = [
+    PointColumn::needed(
+        "angle_deg",
+        Number,
+        "deg",
+        "angle on the path, from the first axis towards the second; it may go on over the turns",
+    ),
+    PointColumn::needed("deviation_um", Number, "um", "radius less the nominal one"),
+    PointColumn::optional(
+        "direction",
+        Number,
+        "",
+        "1 where the path is counter-clockwise, -1 where it is clockwise; without it by the angles",
+    ),
+];
+
+impl PointSeparator for Circular {
+    fn columns(&self) -> Vec<PointColumn> {
+        COLUMNS.into()
+    }
+
+    fn tables(&self) -> Vec<TableSpec> {
+        vec![table()]
+    }
+
+    fn separate(&self, points: &Points) -> Result<Outcome> {
+        let paths = Paths::of(points)?;
+        let of_means: Vec<Vec<f64>> = paths.turns.iter().map(|turns| mean_of(turns)).collect();
+        let values = self
+            .values(&paths, &of_means, 0.0)
+            .ok_or_else(|| refused(points, "its points have no reference circle".into()))?;
+        let computed = values.into_iter().map(|(symbol, value, about)| {
+            let is_key = symbol.starts_with('G') || symbol == "H";
+            let least = if matches!(symbol.as_str(), "D" | "F_max" | "F_min") { f64::NEG_INFINITY } else { 0.0 };
+            Computed { symbol, value, about, is_key, least }
+        });
+        let computed: Vec<Computed> = computed.collect();
+        let noise = Noise::of(&paths.turns);
+        let values_of = |means: &[Vec<f64>], longer_um: f64| -> Vec<f64> {
+            let values = self.values(&paths, means, longer_um);
+            values.map_or_else(
+                || vec![f64::NAN; computed.len()],
+                |values| values.into_iter().map(|(_, value, _)| value).collect(),
+            )
+        };
+        let least = noise.taken_out(&of_means, &paths.turns);
+        let truth = [&least, &of_means].map(|means| values_of(means, 0.0));
+        let error = |machine: Machine, draw: &mut Draw| -> Vec<f64> {
+            let (means, truth) = if machine == Machine::Least { (&least, &truth[0]) } else { (&of_means, &truth[1]) };
+            let again = noise.added_to(means, &paths.turns, draw);
+            let again = values_of(&again, self.0.radius_std_um * draw.normal());
+            again.iter().zip(truth).map(|(again, truth)| again - truth).collect()
+        };
+        let mut remarks = Vec::new();
+        let known = paths.turns.iter().all(|turns| turns.len() > 1);
+        if !known {
+            remarks.push(
+                "one turn in a direction: nothing shows its uncertainty; record two or more turns in each direction"
+                    .into(),
+            );
+        }
+        if paths.signs.len() == 1 {
+            remarks.push(
+                "the path was recorded in one direction: there is no hysteresis and no bidirectional value".into(),
+            );
+        }
+        let mut values = with_uncertainty(&computed, "um", seed(&["circular", &self.0.plane]), error);
+        for value in values.iter_mut().filter(|_| !known) {
+            (value.std, value.interval_95) = (None, None);
+        }
+        Ok(Outcome {
+            convention: format!(
+                "deviation is radius less the nominal one of {} mm; + is counter-clockwise, from the first axis of {} towards the second",
+                self.0.radius_mm, self.0.plane
+            ),
+            tables: vec![rows(&paths, &of_means)?],
+            values: values.into_iter().map(|value| value.of(&self.0.plane)).collect(),
+            remarks,
+            ..Outcome::default()
+        })
+    }
+}
+
+impl Circular {
+    /// The values of paths; nothing where they have no reference circle. `longer_um` is what the instrument is longer by than it says.
+    fn values(&self, paths: &Paths, means: &[Vec<f64>], longer_um: f64) -> Option<Vec<(String, f64, &'static str)>> {
+        let mut points = roundness::Points::default();
+        let one = || (0..ANGLES).map(|angle| TAU * angle as f64 / ANGLES as f64);
+        let zone = |points: &roundness::Points| Some(points.values(&points.reference(Reference::MinimumZone)?).ront_um);
+        let mut values = Vec::new();
+        for (sign, path_um) in paths.signs.iter().zip(means) {
+            points.set_profile(&Angles::equal(ANGLES), path_um, self.0.radius_mm);
+            let name = format!("G{}", if *sign > 0 { '+' } else { '-' });
+            values.push((
+                name,
+                zone(&points)?,
+                "circular deviation of one direction, about the minimum zone circles (ISO 230-4)",
+            ));
+        }
+        let together: Vec<f64> = means.concat();
+        let angles: Angles = (0..means.len()).flat_map(|_| one()).collect();
+        points.set_profile(&angles, &together, self.0.radius_mm);
+        let circle = points.reference(Reference::LeastSquares)?;
+        let about: Vec<f64> = points.deviations_um(&circle).collect();
+        if let [first, second] = means {
+            values.insert(0, ("G_b".into(), zone(&points)?, "bidirectional circular deviation (ISO 230-4)"));
+            let [ahead, behind] = [&about[..first.len()], &about[first.len()..first.len() + second.len()]];
+            let widest = ahead.iter().zip(behind).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            values.insert(1, ("H".into(), widest, "circular hysteresis (ISO 230-4)"));
+        }
+        // The circle about the least-squares centre that the nominal one is.
+        let deviation = circle.deviation_um - longer_um;
+        values.push(("D".into(), deviation, "mean bidirectional radial deviation (ISO 230-4)"));
+        let from_nominal = || about.iter().map(|one| one + deviation);
+        values.push((
+            "F_max".into(),
+            from_nominal().fold(f64::NEG_INFINITY, f64::max),
+            "largest radial deviation (ISO 230-4)",
+        ));
+        values.push((
+            "F_min".into(),
+            from_nominal().fold(f64::INFINITY, f64::min),
+            "smallest radial deviation (ISO 230-4)",
+        ));
+        Some(values)
+    }
+}
+
+/// Orders of which a turn is off by as a whole: by an error of its own shape. Above, errors are of any phase.
+const OF_A_TURN: usize = 8;
+
+/// What changes from turn to turn, by order.
+struct Noise {
+    /// Variance of one turn's coefficient, real and imaginary part together, from order 0; the same in both directions.
+    variance: Vec<f64>,
+    /// Complex numbers behind each.
+    freedom: usize,
+    /// Low orders of each turn less their mean, `[direction][turn][order]`.
+    of_turns: Vec<Vec<Vec<Complex64>>>,
+}
+
+impl Noise {
+    fn of(turns: &[Vec<Vec<f64>>]) -> Self {
+        let mut fourier = Fourier::new(ANGLES);
+        let mut variance = vec![0.0; fourier.max_order() + 1];
+        let mut harmonics = vec![Complex64::ZERO; variance.len()];
+        let mut of_turns = Vec::new();
+        let freedom: usize = turns.iter().map(|turns| turns.len() - 1).sum();
+        for turns in turns {
+            let mean = mean_of(turns);
+            let mut low = Vec::new();
+            for turn in turns {
+                fourier.analyse(turn.iter().zip(&mean).map(|(turn, mean)| turn - mean), &mut harmonics);
+                variance.iter_mut().zip(&harmonics).for_each(|(sum, harmonic)| *sum += harmonic.norm_sqr());
+                low.push(harmonics[..OF_A_TURN].to_vec());
+            }
+            of_turns.push(low);
+        }
+        variance.iter_mut().for_each(|sum| *sum /= freedom.max(1) as f64);
+        Self { variance, freedom, of_turns }
+    }
+
+    /// Means of turns without the power that noise has in each order.
+    fn taken_out(&self, means: &[Vec<f64>], turns: &[Vec<Vec<f64>>]) -> Vec<Vec<f64>> {
+        let mut fourier = Fourier::new(ANGLES);
+        let mut harmonics = vec![Complex64::ZERO; self.variance.len()];
+        let mut taken = Vec::new();
+        for (mean, turns) in means.iter().zip(turns) {
+            fourier.analyse(mean.iter().copied(), &mut harmonics);
+            let variance: Vec<f64> = self.variance.iter().map(|variance| variance / turns.len() as f64).collect();
+            // An order that stands out is judged by itself; of the others an octave together, since half of all noise is above its mean.
+            let mut first = 1;
+            while first < harmonics.len() {
+                let octave = first..(2 * first).min(harmonics.len());
+                let shines = |order: &usize| stands_out(harmonics[*order], variance[*order]);
+                let (alone, others): (Vec<usize>, Vec<usize>) = octave.clone().partition(shines);
+                let power = |orders: &[usize]| orders.iter().map(|order| harmonics[*order].norm_sqr()).sum::<f64>();
+                let noise = |orders: &[usize]| orders.iter().map(|order| variance[*order]).sum::<f64>();
+                let shares: Vec<(usize, f64)> = alone
+                    .iter()
+                    .map(|order| (*order, without_noise(power(&[*order]), noise(&[*order]))))
+                    .chain(others.iter().map(|order| (*order, without_noise(power(&others), noise(&others)))))
+                    .collect();
+                shares.into_iter().for_each(|(order, share)| harmonics[order] *= share);
+                first = octave.end;
+            }
+            taken.push(fourier.synthesise(harmonics.iter().copied()).to_vec());
+        }
+        taken
+    }
+
+    /// Means of turns with another error of theirs.
+    fn added_to(&self, means: &[Vec<f64>], turns: &[Vec<Vec<f64>>], draw: &mut Draw) -> Vec<Vec<f64>> {
+        let mut fourier = Fourier::new(ANGLES);
+        let variance: Vec<f64> =
+            self.variance.iter().map(|variance| variance * draw.true_std_ratio(2 * self.freedom).powi(2)).collect();
+        let mut again = Vec::new();
+        for ((mean, turns), of_turns) in means.iter().zip(turns).zip(&self.of_turns) {
+            let count = turns.len() as f64;
+            let widened = draw.true_std_ratio(turns.len() - 1) / (count * (count - 1.0)).sqrt();
+            let by: Vec<f64> = turns.iter().map(|_| widened * draw.normal()).collect();
+            let errors = variance.iter().enumerate().map(|(order, variance)| {
+                if order < OF_A_TURN {
+                    return of_turns.iter().zip(&by).map(|(turn, by)| turn[order] * by).sum();
+                }
+                let std = (0.5 * variance / count).sqrt();
+                Complex64::new(std * draw.normal(), std * draw.normal())
+            });
+            let errors: Vec<Complex64> = errors.collect();
+            let error = fourier.synthesise(errors.iter().copied());
+            again.push(mean.iter().zip(error).map(|(mean, error)| mean + error).collect());
+        }
+        again
+    }
+}
+
+fn table() -> TableSpec {
+    TableSpec::new(
+        "path",
+        "radial deviation of the path, mean of the turns of each direction",
+        vec![
+            ColumnSpec::name("direction", "+ counter-clockwise, - clockwise"),
+            ColumnSpec::number("angle_deg", "deg", "angle on the path").repeating(),
+            ColumnSpec::number("deviation_um", "um", "radius less the nominal one, about the centre of the recording"),
+        ],
+    )
+    .figure(Figure::polar("path", "Circular path", "angle_deg", [Measure::new("deviation_um")]).curves(["direction"]))
+}
+
+fn rows(paths: &Paths, means: &[Vec<f64>]) -> Result<TableRows> {
+    let spec = table();
+    let each = || {
+        paths
+            .signs
+            .iter()
+            .zip(means)
+            .flat_map(|(sign, path)| path.iter().enumerate().map(move |(angle, value)| (*sign, angle, *value)))
+    };
+    let rows = spec.rows(vec![
+        texts(each().map(|(sign, ..)| if sign > 0 { "+" } else { "-" })),
+        numbers(each().map(|(_, angle, _)| 360.0 * angle as f64 / ANGLES as f64)),
+        numbers(each().map(|(.., value)| value)),
+    ])?;
+    Ok(TableRows { table: spec.name, rows })
+}

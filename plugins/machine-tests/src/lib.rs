@@ -1,0 +1,23 @@
+//! Acceptance tests of machine tools from measured points: values of the standards by their symbols, with uncertainty.
+//!
+//! | separator | test |
+//! | --- | --- |
+//! | `positioning` | ISO 230-2: accuracy and repeatability of positioning of one axis |
+//! | `circular` | ISO 230-4: circular deviation, radial deviation and hysteresis of a circular path |
+
+mod circular;
+mod draws;
+mod paths;
+mod positioning;
+mod runs;
+
+use runout_core::pipeline::{Plugin, Registry};
+
+pub use circular::CircularConfig;
+pub use positioning::PositioningConfig;
+
+/// Adds the separators.
+pub fn register(registry: &mut Registry) {
+    registry.separators.add(Plugin::of::<PositioningConfig>());
+    registry.separators.add(Plugin::of::<CircularConfig>());
+}

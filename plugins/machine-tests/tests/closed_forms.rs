@@ -1,0 +1,111 @@
+//! Values of data that are computed by hand.
+
+#![allow(clippy::unwrap_used, reason = "tests")]
+
+use runout_core::{
+    Result,
+    pipeline::{Context, StageConfig},
+    points::{Column, Points},
+    stage::{Outcome, Separator},
+};
+use runout_machine_tests::{CircularConfig, PositioningConfig};
+
+fn outcome<C: StageConfig<Stage = Separator>>(config: C, columns: &[(&str, Vec<f64>)]) -> Result<Outcome> {
+    let context = Context { folder: std::path::Path::new("."), rig: None };
+    let Separator::Points(separator) = config.check(&context).unwrap() else { panic!("it takes points") };
+    let columns = columns.iter().map(|(name, values)| Column { name: (*name).into(), values: values.clone() });
+    separator.separate(&Points { columns: columns.collect(), ..Points::default() })
+}
+
+fn value(outcome: &Outcome, symbol: &str) -> f64 {
+    outcome.values.iter().find(|value| value.symbol == symbol).unwrap().value.unwrap()
+}
+
+fn positioning() -> PositioningConfig {
+    PositioningConfig { axis: "X".into(), rotary: false, scale_std_ppm: 0.0 }
+}
+
+/// Two targets, two runs from each side. Means + 1, 4 and − 0, 6; standard deviations √2 of {0, 2}, {3, 5}, {−1, 1} and {5, 7}.
+#[test]
+fn positioning_is_that_of_the_formulas() {
+    let columns = [
+        ("target_mm", vec![0.0, 100.0, 100.0, 0.0, 0.0, 100.0, 100.0, 0.0]),
+        ("deviation_um", vec![0.0, 3.0, 5.0, -1.0, 2.0, 5.0, 7.0, 1.0]),
+    ];
+    let found = outcome(positioning(), &columns).unwrap();
+    let s = 2.0_f64.sqrt();
+    let expected = [
+        ("B", 2.0),
+        ("B_mean", 0.5),
+        ("E", 6.0),
+        ("E+", 3.0),
+        ("E-", 6.0),
+        ("M", 4.5),
+        ("R+", 4.0 * s),
+        ("R", 4.0 * s + 2.0),
+        ("A+", 3.0 + 4.0 * s),
+        ("A", 6.0 + 4.0 * s),
+    ];
+    for (symbol, expected) in expected {
+        assert!((value(&found, symbol) - expected).abs() < 1e-12, "{symbol}: {} {expected}", value(&found, symbol));
+    }
+    assert!(found.remarks.iter().any(|remark| remark.starts_with("2 runs")), "{:?}", found.remarks);
+    // The other direction of the file's own deviations is another machine: reversed signs leave ranges, and turn nothing else.
+    let mirrored: Vec<f64> = columns[1].1.iter().map(|value| -value).collect();
+    let mirrored = outcome(positioning(), &[columns[0].clone(), ("deviation_um", mirrored)]).unwrap();
+    assert!((value(&mirrored, "A") - value(&found, "A")).abs() < 1e-12);
+}
+
+#[test]
+fn a_drift_of_the_runs_is_said() {
+    let mut columns = [("target_mm", Vec::new()), ("deviation_um", Vec::new())];
+    for run in 0..5 {
+        for step in 0..11 {
+            columns[0].1.push(f64::from(step));
+            columns[1].1.push(f64::from(run) + 0.1 * f64::from((run * 7 + step * 5) % 4));
+        }
+    }
+    let found = outcome(positioning(), &columns).unwrap();
+    assert!(
+        found.remarks.iter().any(|remark| remark.starts_with("the runs drift: the last one lies +")),
+        "{:?}",
+        found.remarks
+    );
+    assert!(found.remarks.iter().any(|remark| remark.contains("one side")), "{:?}", found.remarks);
+}
+
+#[test]
+fn what_cannot_be_evaluated_is_refused() {
+    let refused = |columns: &[(&str, Vec<f64>)]| outcome(positioning(), columns).unwrap_err().to_string();
+    let one = refused(&[("target_mm", vec![5.0; 4]), ("deviation_um", vec![0.0; 4])]);
+    assert!(one.contains("at least 2 target positions"), "{one}");
+    let once = refused(&[("target_mm", vec![0.0, 1.0, 2.0]), ("deviation_um", vec![0.0; 3])]);
+    assert!(once.contains("at least 2 approaches of target 0 in direction +1"), "{once}");
+    let side = [("target_mm", vec![0.0, 1.0]), ("deviation_um", vec![0.0; 2]), ("direction", vec![1.0, 2.0])];
+    assert!(refused(&side).contains("row 2: expected a direction of 1 or -1"), "{}", refused(&side));
+}
+
+/// An ellipse of ±3 µm, 2 µm too large, whose clockwise path is 1 µm larger still; recorded 40 µm off centre.
+#[test]
+fn a_circle_has_the_values_of_its_geometry() {
+    let mut columns = [("angle_deg", Vec::new()), ("deviation_um", Vec::new())];
+    for (side, larger) in [(1.0, 2.0), (1.0, 2.0), (-1.0, 3.0), (-1.0, 3.0)] {
+        for step in 0..=900 {
+            let angle = side * f64::from(step) * 0.4_f64;
+            let (sin, cos) = angle.to_radians().sin_cos();
+            columns[0].1.push(angle);
+            // Of a circle off centre, by its own geometry.
+            let (radius, x, y) = (150e3 + larger + 3.0 * (2.0 * angle.to_radians()).cos(), 40.0, -10.0);
+            let along = x * cos + y * sin;
+            let across = y * cos - x * sin;
+            columns[1].1.push(along + (radius * radius - across * across).sqrt() - 150e3);
+        }
+    }
+    let config = CircularConfig { plane: "XY".into(), radius_mm: 150.0, radius_std_um: 0.0 };
+    let found = outcome(config, &columns).unwrap();
+    let expected = [("G+", 6.0), ("G-", 6.0), ("G_b", 7.0), ("H", 1.0), ("D", 2.5), ("F_max", 6.0), ("F_min", -1.0)];
+    for (symbol, expected) in expected {
+        // Radii are along the recorded angle, not that about the other centre: 40 µm of 150 mm turn them by 55″, half a per mille of the ellipse.
+        assert!((value(&found, symbol) - expected).abs() < 0.01, "{symbol}: {} {expected}", value(&found, symbol));
+    }
+}

@@ -1,0 +1,167 @@
+//! Intervals against the truth of simulated machines: noise of each reading, runs that drift, and both.
+
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests; the shares are printed")]
+
+use std::f64::consts::TAU;
+
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use runout_core::{
+    pipeline::{Context, StageConfig},
+    points::{Column, Points},
+    stage::{Outcome, Separator},
+};
+use runout_machine_tests::{CircularConfig, PositioningConfig};
+
+struct Chance(ChaCha8Rng);
+
+impl Chance {
+    fn normal(&mut self) -> f64 {
+        StandardNormal.sample(&mut self.0)
+    }
+}
+
+fn outcome(separator: Separator, columns: &[(&str, Vec<f64>)]) -> Outcome {
+    let Separator::Points(separator) = separator else { panic!("it takes points") };
+    let columns = columns.iter().map(|(name, values)| Column { name: (*name).into(), values: values.clone() });
+    separator.separate(&Points { columns: columns.collect(), ..Points::default() }).unwrap()
+}
+
+fn number(outcome: &Outcome, symbol: &str) -> (f64, f64, [f64; 2]) {
+    let value = outcome.values.iter().find(|value| value.symbol == symbol).unwrap();
+    (value.value.unwrap(), value.std.unwrap(), value.interval_95.unwrap())
+}
+
+/// A machine: mean deviation at a target and side, noise of an approach, and what a run is off by as a whole.
+#[allow(clippy::struct_field_names, reason = "all are in µm")]
+struct Axis {
+    noise_um: f64,
+    of_run_um: f64,
+    backlash_um: f64,
+}
+
+impl Axis {
+    fn mean_um(&self, target_mm: f64, side: f64) -> f64 {
+        0.01 * target_mm
+            + 1.5 * (target_mm / 37.0).sin()
+            + side * 0.5 * self.backlash_um * (1.0 + 0.2 * (target_mm / 90.0).cos())
+    }
+
+    fn measured(&self, chance: &mut Chance, targets_mm: &[f64], runs: usize) -> Outcome {
+        let mut columns = [("target_mm", Vec::new()), ("deviation_um", Vec::new())];
+        for _ in 0..runs {
+            let off = self.of_run_um * chance.normal();
+            for (side, order) in [(1.0, targets_mm.to_vec()), (-1.0, targets_mm.iter().rev().copied().collect())] {
+                for target in order {
+                    columns[0].1.push(target);
+                    columns[1].1.push(self.mean_um(target, side) + off + self.noise_um * chance.normal());
+                }
+            }
+        }
+        let config = PositioningConfig { axis: "X".into(), rotary: false, scale_std_ppm: 0.0 };
+        outcome(config.check(&Context { folder: std::path::Path::new("."), rig: None }).unwrap(), &columns)
+    }
+
+    fn truth_um(&self, targets_mm: &[f64], symbol: &str) -> f64 {
+        let spread = self.noise_um.hypot(self.of_run_um);
+        let [ahead, behind] =
+            [1.0, -1.0].map(|side| targets_mm.iter().map(|target| self.mean_um(*target, side)).collect::<Vec<_>>());
+        let range = |values: &[f64]| {
+            values.iter().fold(f64::MIN, |a, b| a.max(*b)) - values.iter().fold(f64::MAX, |a, b| a.min(*b))
+        };
+        let reversal: Vec<f64> = ahead.iter().zip(&behind).map(|(a, b)| (a - b).abs()).collect();
+        let largest = reversal.iter().copied().fold(0.0, f64::max);
+        match symbol {
+            "E" => range(&[ahead, behind].concat()),
+            "A" => range(&[ahead, behind].concat()) + 4.0 * spread,
+            "B" => largest,
+            "M" => range(&ahead.iter().zip(&behind).map(|(a, b)| 0.5 * (a + b)).collect::<Vec<_>>()),
+            _ => 4.0 * spread + largest,
+        }
+    }
+}
+
+#[test]
+fn intervals_of_positioning_hold_the_truth() {
+    let targets: Vec<f64> = (0..11).map(|index| 50.0 * f64::from(index) + 3.0 * f64::from(index * index % 7)).collect();
+    let trials = 100;
+    let mut worst = f64::INFINITY;
+    for runs in [2, 5, 10] {
+        for (noise_um, of_run_um) in [(0.05, 0.0), (0.5, 0.0), (0.2, 0.5), (2.0, 0.0)] {
+            let axis = Axis { noise_um, of_run_um, backlash_um: 1.0 };
+            let mut chance = Chance(ChaCha8Rng::seed_from_u64(runs as u64));
+            let symbols = ["E", "A", "B", "M", "R"];
+            let mut held = [0_usize; 5];
+            for _ in 0..trials {
+                let found = axis.measured(&mut chance, &targets, runs);
+                for (held, symbol) in held.iter_mut().zip(symbols) {
+                    let (_, _, [low, high]) = number(&found, symbol);
+                    *held += usize::from((low..=high).contains(&axis.truth_um(&targets, symbol)));
+                }
+            }
+            let shares: Vec<String> = symbols
+                .iter()
+                .zip(held)
+                .map(|(symbol, held)| format!("{symbol} {:.0} %", 100.0 * held as f64 / f64::from(trials)))
+                .collect();
+            worst = held.iter().map(|held| *held as f64 / f64::from(trials)).fold(worst, f64::min);
+            println!("{runs} runs, noise {noise_um} µm, of a run {of_run_um} µm: {}", shares.join(", "));
+        }
+    }
+    assert!(worst >= 0.8, "{worst}");
+}
+
+#[test]
+fn intervals_of_circles_hold_the_truth() {
+    let trials = 16;
+    let (mut all, mut kept) = (0.0, 0.0);
+    for turns in [2, 3, 5] {
+        for (noise_um, of_turn_um) in [(0.1, 0.0), (0.5, 0.0), (0.1, 0.5)] {
+            let mut chance = Chance(ChaCha8Rng::seed_from_u64(turns as u64));
+            let symbols = ["G+", "G_b", "H", "D"];
+            let deviation = |angle: f64, side: f64| {
+                3.0 * (2.0 * angle).cos() + 0.7 * (3.0 * angle + 0.4).sin() + side * (0.6 + 0.5 * (angle - 0.3).cos())
+            };
+            let circle = |noise: &mut dyn FnMut() -> f64, turns: usize| {
+                let mut columns = [("angle_deg", Vec::new()), ("deviation_um", Vec::new()), ("direction", Vec::new())];
+                for side in [1.0, -1.0] {
+                    for _ in 0..turns {
+                        let off = of_turn_um * noise();
+                        for step in 0..720 {
+                            let angle = TAU * f64::from(step) / 720.0;
+                            columns[0].1.push(side * angle.to_degrees());
+                            let at = side * angle;
+                            columns[1]
+                                .1
+                                .push(deviation(at, side) + off * (2.0 * at + 1.0).sin() + noise_um * noise() + 2.5);
+                            columns[2].1.push(side);
+                        }
+                    }
+                }
+                let config = CircularConfig { plane: "XY".into(), radius_mm: 150.0, radius_std_um: 0.0 };
+                outcome(config.check(&Context { folder: std::path::Path::new("."), rig: None }).unwrap(), &columns)
+            };
+            let truth = circle(&mut || 0.0, 2);
+            let mut held = [0_usize; 4];
+            for _ in 0..trials {
+                let found = circle(&mut || chance.normal(), turns);
+                for (held, symbol) in held.iter_mut().zip(symbols) {
+                    let (_, _, [low, high]) = number(&found, symbol);
+                    let truth = truth.values.iter().find(|value| value.symbol == symbol).unwrap().value.unwrap();
+                    *held += usize::from((low..=high).contains(&truth));
+                }
+            }
+            let shares: Vec<String> = symbols
+                .iter()
+                .zip(held)
+                .map(|(symbol, held)| format!("{symbol} {:.0} %", 100.0 * held as f64 / f64::from(trials)))
+                .collect();
+            all += f64::from(trials) * held.len() as f64;
+            kept += held.iter().sum::<usize>() as f64;
+            println!("{turns} turns, noise {noise_um} µm, of a turn {of_turn_um} µm: {}", shares.join(", "));
+        }
+    }
+    println!("all: {:.1} %", 100.0 * kept / all);
+    assert!(kept >= 0.87 * all, "{kept} of {all}");
+}
