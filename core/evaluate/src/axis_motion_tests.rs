@@ -156,7 +156,7 @@ fn every_value_has_a_known_symbol_and_unit() {
 }
 
 fn limited(found: &Evaluated, limit: &str, text: &str) -> (Decision, Option<String>) {
-    let limit = toml::from_str::<Limit>(limit).unwrap().check(&settings(text), None).unwrap();
+    let limit = toml::from_str::<Limit>(limit).unwrap().check(&settings(text), &[], None).unwrap();
     let (decided, remarks) = decide(&[limit], &found.placed().collect::<Vec<_>>());
     assert!(remarks.is_empty(), "{remarks:?}");
     (decided[0].decision, decided[0].values[0].missing.clone())
@@ -175,7 +175,7 @@ fn limits_are_decided() {
     );
     for symbol in ["asynchronous-radial-x", "total-radial-x", "synchronous-radial-rotating"] {
         let limit = toml::from_str::<Limit>(&limit(symbol, 1.0)).unwrap();
-        assert!(format!("{:?}", limit.check(&settings(""), None).unwrap_err()).contains("no value"), "{symbol}");
+        assert!(format!("{:?}", limit.check(&settings(""), &[], None).unwrap_err()).contains("no value"), "{symbol}");
     }
 }
 

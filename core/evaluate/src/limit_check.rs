@@ -6,12 +6,18 @@ use runout_error::fault::{Fault, known_names};
 use runout_turning::rig::Rig;
 
 impl Limit {
-    /// Checks it for what will be evaluated.
+    /// Checks it for what will be evaluated, and for a domain's own values, by symbol and unit.
     ///
     /// # Errors
     /// The first that cannot be, with its key.
-    pub fn check(self, evaluate: &Evaluate, rig: Option<&Rig>) -> Result<Self, Fault> {
-        let symbols = evaluate.symbols();
+    pub fn check(
+        self,
+        evaluate: &Evaluate,
+        own: &[(&'static str, &'static str)],
+        rig: Option<&Rig>,
+    ) -> Result<Self, Fault> {
+        let mut symbols = evaluate.symbols();
+        symbols.extend(own.iter().map(|(symbol, unit)| ((*symbol).to_owned(), *unit)));
         match symbols.iter().find(|(symbol, _)| *symbol == self.symbol) {
             Some((symbol, unit)) if ascii_unit(unit) != ascii_unit(&self.unit) => {
                 let message = format!("{symbol} is given in `{}`, found `{}`", ascii_unit(unit), self.unit);

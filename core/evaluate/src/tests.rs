@@ -699,7 +699,7 @@ fn limited(limits: &str) -> Vec<(Decision, Vec<(Decision, bool)>, usize)> {
         .collect();
     let mut evaluate = Evaluate::default();
     let limit: Limit = toml::from_str(limits).unwrap();
-    evaluate.add_limit(limit.check(&evaluate, None).unwrap());
+    evaluate.add_limit(limit.check(&evaluate, &[], None).unwrap());
     let (decided, remarks) = decide(evaluate.limits(), &placed);
     let of = |value: &LimitValue| (value.decision, value.within);
     decided.iter().map(|one| (one.decision, one.values.iter().map(of).collect(), remarks.len())).collect()
@@ -879,7 +879,7 @@ fn a_unit_may_be_written_in_each_usual_way() {
     ] {
         for unit in units {
             let limit: Limit = toml::from_str(&format!("symbol = '{symbol}'\nunit = '{unit}'\nupper = 1")).unwrap();
-            assert!(limit.check(&Evaluate::default(), None).is_ok(), "{symbol} {unit}");
+            assert!(limit.check(&Evaluate::default(), &[], None).is_ok(), "{symbol} {unit}");
         }
     }
     // No symbol is given to two values; Ra has a filter or none.
@@ -931,13 +931,13 @@ fn what_cannot_be_evaluated_is_refused_at_its_place() {
         ("symbol = 'RONt'\nunit = 'um'\nupper = inf", "upper", "finite"),
     ] {
         let limit: Limit = toml::from_str(text).unwrap();
-        let fault = limit.check(&Evaluate::default(), None).unwrap_err();
+        let fault = limit.check(&Evaluate::default(), &[], None).unwrap_err();
         let said = format!("{fault}; {}", fault.help.clone().unwrap_or_default());
         assert!(said.contains(words), "{said}");
         assert_eq!(fault.place, Place::Path(vec![key(at)]), "{text}");
     }
     let none: Limit = toml::from_str("symbol = 'RONt'\nunit = 'um'").unwrap();
-    assert!(none.check(&Evaluate::default(), None).unwrap_err().message.contains("`upper`, `lower` or both"));
+    assert!(none.check(&Evaluate::default(), &[], None).unwrap_err().message.contains("`upper`, `lower` or both"));
 }
 
 /// Sections are known of a rig; measured points bring their own.

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use runout_draws::Uncertainty;
+use runout_draws::{NORMAL_95, Uncertainty};
 use runout_table::number::ROUNDING;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -198,6 +198,31 @@ impl NamedValue {
             refuted_by: value.refuted_by.clone(),
             is_key: false,
         }
+    }
+
+    /// A domain's own value as one that a limit may name; nothing of one that is not observable, or that is a standard's.
+    #[must_use]
+    pub fn own(&self) -> Option<Value> {
+        let value = self.value.filter(|_| self.reference.is_none())?;
+        let normal = |std: f64| [value - NORMAL_95 * std, value + NORMAL_95 * std];
+        let known = |std: f64| Uncertainty { std, interval_95: self.interval_95.unwrap_or(normal(std)), draws: 0 };
+        Some(Value {
+            symbol: self.symbol.clone(),
+            unit: self.unit.clone(),
+            value,
+            source: self.about.clone(),
+            band_upr: [0; 2],
+            lost_orders: Vec::new(),
+            weakened_above_upr: None,
+            absent_above_upr: None,
+            filter: String::new(),
+            reference: String::new(),
+            coverage: 1.0,
+            uncertainty: self.std.map(known),
+            no_uncertainty: self.no_uncertainty.clone(),
+            raised_by_noise: None,
+            refuted_by: self.refuted_by.clone(),
+        })
     }
 
     /// Which value it is.

@@ -89,6 +89,10 @@ impl PointSeparator for Circular {
         vec![table()]
     }
 
+    fn symbols(&self) -> Vec<(&'static str, &'static str)> {
+        ["G_b", "H", "G+", "G-", "D", "F_max", "F_min"].map(|symbol| (symbol, "um")).to_vec()
+    }
+
     fn separate(&self, points: &Points) -> Result<Outcome> {
         let paths = Paths::of(points)?;
         let of_means: Vec<Vec<f64>> = paths.turns.iter().map(|turns| mean_of(turns)).collect();

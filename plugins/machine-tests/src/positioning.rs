@@ -134,6 +134,12 @@ impl PointSeparator for Positioning {
         vec![self.table()]
     }
 
+    fn symbols(&self) -> Vec<(&'static str, &'static str)> {
+        let [_, deviation, _] = self.own_columns();
+        let symbols = ["A", "E", "R", "B", "B_mean", "M", "A+", "E+", "R+", "A-", "E-", "R-"];
+        symbols.map(|symbol| (symbol, deviation.unit)).to_vec()
+    }
+
     fn separate(&self, points: &Points) -> Result<Outcome> {
         let [target, deviation, _] = self.own_columns();
         let approaches = Approaches::of(points, target.name, deviation.name)?;

@@ -305,7 +305,9 @@ fn evaluate(
     let configured = table(root, "evaluate")?;
     let limits = tables(root, "limit")?;
     let given = route.evaluables();
-    if let (true, Some(table)) = (given.is_empty(), configured.as_ref().or(limits.first())) {
+    let own = route.point_separator().map(PointSeparator::symbols).unwrap_or_default();
+    let limited = limits.first().filter(|_| own.is_empty());
+    if let (true, Some(table)) = (given.is_empty(), configured.as_ref().or(limited)) {
         let fault = Fault::span(
             table.span(),
             "there is no form here, nor another profile, height map or motion of an axis, whose values could be chosen or limited",
@@ -334,7 +336,7 @@ fn evaluate(
         evaluate.add_faces(rig);
     }
     for table in limits {
-        let limit = checked::<Limit, _>(&table, |limit| limit.check(&evaluate, rig))?;
+        let limit = checked::<Limit, _>(&table, |limit| limit.check(&evaluate, &own, rig))?;
         evaluate.add_limit(limit);
     }
     Ok(evaluate)

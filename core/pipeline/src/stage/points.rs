@@ -52,6 +52,11 @@ pub trait PointSeparator: Send + Sync {
         Vec::new()
     }
 
+    /// Symbols of its own values, with their units: those that `[[limit]]` may name.
+    fn symbols(&self) -> Vec<(&'static str, &'static str)> {
+        Vec::new()
+    }
+
     /// Whether its form is that of one section, which makes no surface.
     fn is_one_section(&self) -> bool {
         false

@@ -95,9 +95,11 @@ impl Summary {
         let mut limited: HashMap<Key, Vec<(&Limit, &LimitValue)>> = HashMap::new();
         for limit in &self.limits {
             for found in &limit.values {
-                let (symbol, reference) = (&*limit.limit.symbol, &*found.reference);
-                let of = found.section.as_deref();
-                let key = [found.station.as_deref(), of, Some(symbol), Some(reference), Some(&*found.filter)];
+                // A domain's own values have neither.
+                let [reference, filter] =
+                    [&found.reference, &found.filter].map(|text| Some(text.as_str()).filter(|text| !text.is_empty()));
+                let (symbol, of) = (&*limit.limit.symbol, found.section.as_deref());
+                let key = [found.station.as_deref(), of, Some(symbol), reference, filter];
                 limited.entry(key).or_default().push((&limit.limit, found));
             }
         }
