@@ -75,10 +75,10 @@ impl Diagnosis {
             Verdict::Explained => "Explained: with what was added, noise only is left",
             Verdict::Unexplained => "Unexplained: something is left that no known effect explains",
             Verdict::Improved => {
-                "Improved: effects were added. The noise level is not known, so the residual may hold more"
+                "Improved: effects were added. The noise level is not known, so the residual may contain more"
             }
             Verdict::NothingFound => {
-                "Nothing found: no effect was added. The noise level is not known, so the residual may hold more"
+                "Nothing found: no effect was added. The noise level is not known, so the residual may contain more"
             }
         }
     }

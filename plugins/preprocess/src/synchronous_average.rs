@@ -173,7 +173,7 @@ impl SynchronousAverage {
         }
         if self.max_order() > orders_held(turn) {
             warnings.push(format!(
-                "{turn:.0} samples a turn hold no orders above {}: the average ends there, on {} angles",
+                "{turn:.0} samples a turn have no orders above {}: the average ends there, on {} angles",
                 orders_held(turn),
                 angles
             ));

@@ -94,7 +94,7 @@ pub enum Effect {
     SensorSign(SensorSign),
     /// A mistake in the rig: two channels are swapped.
     SensorsSwapped(SensorsSwapped),
-    /// A mistake in the recording: a channel holds the signal of another.
+    /// A mistake in the recording: a channel has the signal of another.
     SensorsIdentical(SensorsIdentical),
     /// A mistake in the rig: two setups are swapped.
     SetupsSwapped(SetupsSwapped),
