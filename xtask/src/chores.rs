@@ -169,7 +169,7 @@ pub(crate) fn report_picture() -> Outcome {
         "--no-sandbox",
         "--hide-scrollbars",
         "--enable-unsafe-swiftshader",
-        "--window-size=1440,1720",
+        "--window-size=1440,1260",
     ]);
     // Charts are drawn one after the other.
     page.arg("--virtual-time-budget=30000").arg(format!("--screenshot={}", picture.display()));
