@@ -51,7 +51,7 @@ pub(crate) fn test(foreign_readers: bool, complete: bool) -> Outcome {
     run_example(&program)?;
     let package = || if foreign_readers { python::test() } else { Ok(()) };
     if complete {
-        site::site(&["--links"])?;
+        site::pages()?;
         // Each of them takes one processor.
         std::thread::scope(|scope| {
             let program = program.display().to_string();

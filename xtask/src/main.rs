@@ -8,6 +8,7 @@ mod chores;
 mod data;
 mod foreign;
 mod fuzz;
+mod gallery;
 mod house;
 mod kill_test;
 mod process;
@@ -106,7 +107,7 @@ fn main() -> ExitCode {
         ["demo"] => chores::demo(),
         ["report-picture"] => chores::report_picture(),
         ["report-check", ref rest @ ..] => report_check::check(rest),
-        ["site", ref rest @ ..] => site::site(rest),
+        ["site", ref rest @ ..] => gallery::site(rest),
         ["test"] => chores::test(std::env::var_os("RUNOUT_REQUIRE_FOREIGN").is_some_and(|value| value == "1"), false),
         ["test", "--ci"] => chores::test(true, true),
         ["fuzz", ref rest @ ..] => fuzz::fuzz(rest),

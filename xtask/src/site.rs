@@ -1,48 +1,34 @@
-//! The website: pages of `docs/` and READMEs, and a gallery of the examples' reports, by MkDocs, which checks every link and anchor.
+//! The website: pages of `docs/` and READMEs, by MkDocs, which checks every link and anchor.
 
 use std::{
     collections::BTreeSet,
-    fmt::Write,
     fs,
     path::{Path, PathBuf},
     process::Command,
 };
 
 use crate::{
-    foreign,
     process::{Outcome, answer, root, run, say, target, tools},
-    report_check::with_report,
-    results,
-    setup::{self, cargo},
+    setup,
 };
 
 /// What makes the pages.
 const GENERATOR: &str = "mkdocs-material>=9.6,<10";
-/// Lines of the terminal that the gallery shows of an example.
-const SHOWN: usize = 14;
-/// Size of a picture of a report, in pixels.
-const PICTURE: &str = "--window-size=1200,800";
+const NO_GALLERY: &str = "# Gallery\n\n`cargo xtask site` runs the examples and puts their reports here.\n";
 
-/// Builds `target/site/html`; with `--links` without the gallery, which needs no program.
-pub(crate) fn site(words: &[&str]) -> Outcome {
-    let gallery = match words {
-        ["--links"] => None,
-        [] => {
-            run(&mut cargo(&["build", "--release", "--package", "runout"])?)?;
-            Some(target().join("release/runout"))
-        }
-        [program] => Some(PathBuf::from(program)),
-        _ => return Err("site takes --links, a PROGRAM or nothing".into()),
-    };
+/// Builds the pages without the gallery, which needs no program.
+pub(crate) fn pages() -> Outcome {
+    build(&|_| Ok(NO_GALLERY.to_owned()))
+}
+
+/// Builds `target/site/html` with a page that `gallery` writes; it gets the folder of the pages, where its files go.
+pub(crate) fn build(gallery: &dyn Fn(&Path) -> Outcome<String>) -> Outcome {
     let folder = target().join("site");
     let pages = folder.join("pages");
     empty(&pages)?;
     stage(&pages)?;
-    let text = match gallery {
-        None => "# Gallery\n\n`cargo xtask site` runs the examples and puts their reports here.\n".to_owned(),
-        Some(program) => reports(&folder.join("run"), &program, &pages)?,
-    };
-    write(&pages.join("gallery.md"), &text)?;
+    let page = pages.join("gallery.md");
+    fs::write(&page, gallery(&pages)?).map_err(|error| format!("cannot write {}: {error}", page.display()))?;
     let settings = folder.join("mkdocs.yml");
     copy(&root().join("docs/mkdocs.yml"), &settings)?;
     // With `--quiet`, the generator counts no warnings.
@@ -107,111 +93,17 @@ fn normal(path: &Path) -> PathBuf {
     normal
 }
 
-/// Runs all examples, copies their reports to the pages, and gives the text of the gallery.
-fn reports(folder: &Path, program: &Path, pages: &Path) -> Outcome<String> {
-    empty(folder)?;
-    let place = pages.join("reports");
-    // A later command of a README may write the same report of other data: the first one stays.
-    let mut keep = |example: &Path| {
-        for report in html_below(example)? {
-            let kept = place.join(name(example)).join(report.strip_prefix(example).unwrap_or(&report));
-            if !kept.is_file() {
-                copy(&report, &kept)?;
-            }
-        }
-        Ok(())
-    };
-    results::run_examples(folder, program, &with_report, &mut keep)?;
-    let browser = foreign::browser();
-    let mut text = String::from(
-        "# Gallery\n\nThe reports of the examples, as their pipelines write them. Each opens in the browser and needs no network.\n",
-    );
-    for example in children(&folder.join("examples"))? {
-        let name = name(&example);
-        let found = html_below(&place.join(&name))?;
-        let Some(first) = found.first() else { continue };
-        let shown = |report: &Path| report.strip_prefix(pages).unwrap_or(report).display().to_string();
-        let _ = write!(text, "\n## {}\n\n[How it is made](examples/{name}/README.md)", title(&example));
-        for report in &found {
-            let inside = report.strip_prefix(place.join(&name)).unwrap_or(report).display().to_string();
-            let _ = write!(text, " · [{}]({})", inside.trim_start_matches("out/"), shown(report));
-        }
-        text.push('\n');
-        if let Some(browser) = browser {
-            let picture = place.join(format!("{name}.png"));
-            photograph(browser, first, &picture)?;
-            let _ = write!(text, "\n[![First screen of the report]({})]({})\n", shown(&picture), shown(first));
-        }
-        if let Some(answer) = first_values(&example) {
-            let _ = write!(text, "\n```text\n{answer}\n```\n");
-        }
-    }
-    Ok(text)
-}
-
-fn name(example: &Path) -> String {
-    example.file_name().unwrap_or_default().to_string_lossy().into_owned()
-}
-
-/// The heading of an example's README.
-fn title(example: &Path) -> String {
-    let text = fs::read_to_string(example.join("README.md")).unwrap_or_default();
-    let heading = text.lines().find_map(|line| line.strip_prefix("# ")).unwrap_or("Example");
-    heading.to_owned()
-}
-
-/// What a run of the example printed first: verdict and key values.
-fn first_values(example: &Path) -> Option<String> {
-    let printed = (0..).map_while(|number| fs::read_to_string(example.join(format!("{number}.txt"))).ok());
-    let mut answers = printed.filter(|text| text.contains("Key values"));
-    let text = answers.next()?;
-    Some(text.lines().take(SHOWN).collect::<Vec<_>>().join("\n").trim_end().to_owned())
-}
-
-/// Takes a picture of the first screen of a page.
-fn photograph(browser: &str, page: &Path, picture: &Path) -> Outcome {
-    let mut command = Command::new(browser);
-    command.args(["--headless", "--no-sandbox", "--hide-scrollbars", "--enable-unsafe-swiftshader", PICTURE]);
-    command.arg("--virtual-time-budget=15000").arg(format!("--screenshot={}", picture.display()));
-    let output = command.arg(format!("file://{}", page.display())).output();
-    let output = output.map_err(|error| format!("cannot start {browser}: {error}"))?;
-    if output.status.success() { Ok(()) } else { Err(format!("{browser} took no picture of {}", page.display())) }
-}
-
-/// All reports below a folder, which need not be there: those of a folder before those of its folders.
-fn html_below(folder: &Path) -> Outcome<Vec<PathBuf>> {
-    if !folder.is_dir() {
-        return Ok(Vec::new());
-    }
-    let (folders, files): (Vec<_>, Vec<_>) = children(folder)?.into_iter().partition(|path| path.is_dir());
-    let is_page = |path: &PathBuf| path.extension().is_some_and(|extension| extension == "html");
-    let mut found: Vec<_> = files.into_iter().filter(is_page).collect();
-    for folder in folders {
-        found.extend(html_below(&folder)?);
-    }
-    Ok(found)
-}
-
-fn children(folder: &Path) -> Outcome<Vec<PathBuf>> {
-    let entries = fs::read_dir(folder).map_err(|error| format!("cannot read {}: {error}", folder.display()))?;
-    let mut paths: Vec<_> = entries.filter_map(|entry| Some(entry.ok()?.path())).collect();
-    paths.sort();
-    Ok(paths)
-}
-
-fn empty(folder: &Path) -> Outcome {
+/// Makes an empty folder.
+pub(crate) fn empty(folder: &Path) -> Outcome {
     let _ = fs::remove_dir_all(folder);
     fs::create_dir_all(folder).map_err(|error| format!("cannot make {}: {error}", folder.display()))
 }
 
-fn copy(from: &Path, to: &Path) -> Outcome {
+/// Copies a file, with the folders that it needs.
+pub(crate) fn copy(from: &Path, to: &Path) -> Outcome {
     let problem = |error: std::io::Error| format!("cannot copy {} to {}: {error}", from.display(), to.display());
     fs::create_dir_all(to.parent().unwrap_or(to)).map_err(problem)?;
     fs::copy(from, to).map(|_| ()).map_err(problem)
-}
-
-fn write(path: &Path, text: &str) -> Outcome {
-    fs::write(path, text).map_err(|error| format!("cannot write {}: {error}", path.display()))
 }
 
 #[cfg(test)]

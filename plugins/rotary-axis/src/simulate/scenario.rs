@@ -140,7 +140,7 @@ pub enum SimulatedEffect {
     },
     /// A ball slips on the table: no effect of the closed loop.
     SlippedBall {
-        /// Row from which it stands elsewhere.
+        /// Row from which it is elsewhere.
         row: usize,
         /// Displacement on the table, in µm.
         by_um: [f64; 3],

@@ -37,7 +37,7 @@ pub struct Scenario {
     pub tool_mm: [f64; 3],
     /// The tracker's noise.
     pub tracker: Tracker,
-    /// How the tracker stood.
+    /// Placement of the tracker.
     #[serde(default)]
     pub placement: Placement,
     /// Smooth random error field.
