@@ -43,7 +43,7 @@ pub(crate) enum Command {
     Plugins(PluginsArgs),
     /// Print JSON Schemas of configurations and results.
     Schema(SchemaArgs),
-    /// Say what a file holds (HDF5, Parquet, CSV, X3P, SDF, SUR).
+    /// Show the contents of a file (HDF5, Parquet, CSV, X3P, SDF, SUR).
     Inspect(InspectArgs),
     /// Write a pipeline to start from, for a method and, where it is given, a file.
     New(NewArgs),

@@ -1,4 +1,4 @@
-//! What this program has on board: the one list.
+//! The built-in plugins.
 
 use runout_core::pipeline::Registry;
 

@@ -92,7 +92,7 @@ fn leave_nothing_half() {
     let _ = ctrlc::set_handler(|| {
         ENDS.store(true, Ordering::SeqCst);
         let _nothing_is_begun = abandon_all();
-        let _ = writeln!(io::stderr(), "\ninterrupted: what was not finished is taken away");
+        let _ = writeln!(io::stderr(), "\ninterrupted: unfinished output files were removed");
         std::process::exit(INTERRUPTED);
     });
 }

@@ -38,7 +38,7 @@ class HeightMap:
     """HDF5: follows external links, virtual data sets and data in other files, all of which are then inputs. Default: false."""
 
     layer: Union[str, None] = None
-    """Name or number, from 1, of the map in a file that holds several; without it the first one."""
+    """Name or number, from 1, of the map in a file of several; without it the first one."""
 
     path: str
     """File with heights on a grid, or a profile, relative to the TOML: X3P (ISO 25178-72), SDF (ISO 25178-71), SUR (Digital Surf),

@@ -54,7 +54,7 @@ class SynchronousAverage:
     than this many times the usual distance; without it, none are."""
 
     samples_per_rev: int
-    """Equal angles per turn of the average, 4 to 131072; it holds the orders below half of them, as far as the recording has them.
+    """Equal angles per turn of the average, 4 to 131072; it has the orders below half of them, as far as the recording has them.
     Above 4096, and far above the recording's own samples a turn (8 times, rounded up to a power of two), fewer are used, with a
     warning."""
 

@@ -351,7 +351,7 @@ class SpatialError:
     """How to compensate: by X, Y and Z without limits where nothing is said."""
 
     declared: Union[Sequence[Union[Literal['rigid'], Literal['translation']]], None] = None
-    """What is always fitted: `rigid` (how the tracker stood: three displacements, three rotations), `translation` (ordinary
+    """What is always fitted: `rigid` (placement of the tracker: three displacements, three rotations), `translation` (ordinary
     kriging), nothing (a field of mean zero)."""
 
     kriging: Union[Mapping[str, Any], None] = None

@@ -147,7 +147,7 @@ class Diagnose:
     """Effects that are there and whose size is known: applied as they are, neither looked for nor fitted."""
 
     memory_gb: Union[float, None] = None
-    """Memory that the loop may take, in GB: it holds all stations of recorded turns at once, and refuses those that need more.
+    """Memory that the loop may take, in GB: it keeps all stations of recorded turns at once, and refuses those that need more.
     Default: 4.0."""
 
     out: Union[str, None] = None

@@ -50,7 +50,7 @@ pub fn four_sensors(setups: &[(f64, f64)]) -> RigConfig {
     }
 }
 
-/// `docs/physics.md`'s campaign: 60 turns of 512 samples, sensor noise 0.05 µm, asynchronous motion 0.15 µm, form 4 µm rms,
+/// `docs/appendix/physics.md`'s campaign: 60 turns of 512 samples, sensor noise 0.05 µm, asynchronous motion 0.15 µm, form 4 µm rms,
 /// motion 1.5 µm rms, part angles 0°, 99.844°, 202.5°, sensors fixed.
 #[must_use]
 pub fn reference(seed: u64, eccentricity_um: f64) -> SpindleConfig {

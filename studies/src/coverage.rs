@@ -238,7 +238,7 @@ fn true_curve(truth: &StationTruth, quantity: Quantity) -> Option<&[f64]> {
 #[must_use]
 pub fn table(rows: &[Row]) -> String {
     let mut text =
-        String::from("| quantity | intervals | hold the truth | rms error / stated |\n| --- | --- | --- | --- |\n");
+        String::from("| quantity | intervals | contain the truth | rms error / stated |\n| --- | --- | --- | --- |\n");
     for row in rows {
         let ratio = (row.squares / row.stated).sqrt();
         // Writing to a string cannot fail.

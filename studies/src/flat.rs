@@ -50,11 +50,11 @@ pub fn picture(pipeline: &Path) -> Result<Vec<u8>> {
             .with_data(map.values)
             .with_color_map(ColorMap::Viridis)
             .with_x_range(map.x[0], map.x[1])
-            .with_y_range(map.y[0], map.y[1])
-            .with_legend("height / nm");
+            .with_y_range(map.y[0], map.y[1]);
         let plots = vec![Plot::Heatmap(heatmap)];
         let layout = Layout::auto_from_plots(&plots)
             .with_title(title)
+            .with_subtitle("height / nm")
             .with_x_label("x along the feed / mm")
             .with_y_label("y / mm")
             .with_x_axis_min(map.x[0])

@@ -77,11 +77,11 @@ pub fn map(axes: &Axes, map: &Map) -> Result<Vec<u8>, String> {
         .with_data(map.values.clone())
         .with_color_map(ColorMap::Viridis)
         .with_x_range(map.x[0], map.x[1])
-        .with_y_range(map.y[0], map.y[1])
-        .with_legend("deviation / µm");
+        .with_y_range(map.y[0], map.y[1]);
     let plots = vec![Plot::Heatmap(heatmap)];
     let layout = Layout::auto_from_plots(&plots)
         .with_title(axes.title)
+        .with_subtitle("deviation / µm")
         .with_x_label(axes.x)
         .with_y_label(axes.y)
         .with_x_axis_min(map.x[0])

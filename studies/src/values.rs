@@ -212,7 +212,7 @@ pub(crate) fn count(found: &Summary, truth: &Summary, rows: &mut Rows) {
 #[must_use]
 pub fn table(rows: &Rows) -> String {
     let mut text = String::from(
-        "| value | reference | filter | intervals | hold the truth | truth below | truth above | values without an interval |\n\
+        "| value | reference | filter | intervals | contain the truth | truth below | truth above | values without an interval |\n\
          | --- | --- | --- | --- | --- | --- | --- | --- |\n",
     );
     for (name, row) in rows {

@@ -12,7 +12,7 @@ const PACKAGE: &str = "surfalize==0.19.2";
 /// Rings, points of a ring, rounds.
 const DEFAULTS: [&str; 3] = ["400", "2560", "7"];
 
-/// Prints the table of `docs/values.md`; rings, points of a ring and rounds may be given.
+/// Prints the table of `docs/appendix/values.md`; rings, points of a ring and rounds may be given.
 pub(crate) fn peers(words: &[&str]) -> Outcome {
     if words.len() > DEFAULTS.len() || words.iter().any(|word| word.parse::<u32>().map_or(true, |number| number == 0)) {
         return Err("areal-peers takes rings, points of a ring and rounds: whole numbers of at least 1".into());

@@ -8,6 +8,7 @@ use crate::{
     process::{Outcome, answer, root, run, say, target},
     python,
     setup::{self, cargo},
+    site,
 };
 
 /// Picture of the crates, format, lints, tests, and the demo with the program that the tests were built with. With `complete`
@@ -50,6 +51,7 @@ pub(crate) fn test(foreign_readers: bool, complete: bool) -> Outcome {
     run_example(&program)?;
     let package = || if foreign_readers { python::test() } else { Ok(()) };
     if complete {
+        site::pages()?;
         // Each of them takes one processor.
         std::thread::scope(|scope| {
             let program = program.display().to_string();
@@ -167,7 +169,7 @@ pub(crate) fn report_picture() -> Outcome {
         "--no-sandbox",
         "--hide-scrollbars",
         "--enable-unsafe-swiftshader",
-        "--window-size=1440,1720",
+        "--window-size=1440,1260",
     ]);
     // Charts are drawn one after the other.
     page.arg("--virtual-time-budget=30000").arg(format!("--screenshot={}", picture.display()));

@@ -8,6 +8,7 @@ mod chores;
 mod data;
 mod foreign;
 mod fuzz;
+mod gallery;
 mod house;
 mod kill_test;
 mod process;
@@ -17,6 +18,7 @@ mod readmes;
 mod report_check;
 mod results;
 mod setup;
+mod site;
 
 use std::process::ExitCode;
 
@@ -45,6 +47,9 @@ cargo xtask COMMAND
                 take the picture of example 1's report that the README shows, by Chromium
   report-check [PROGRAM]
                 run all examples with a report, look at each page in Chromium, and print size and time of each
+  site [--links | PROGRAM]
+                build the website target/site/html from docs/ and READMEs, with a gallery of the examples' reports; fails on a
+                dead link or anchor; --links builds the pages only
   studies ...   print figures of the READMEs from simulated campaigns; without arguments, says which
   schemas       write schemas/ anew from the types, and the Python package's classes of stages from them
   wheel [--dev] build the Python package into target/wheels; --dev in the profile of the tests, which is quick and its code slow
@@ -102,6 +107,7 @@ fn main() -> ExitCode {
         ["demo"] => chores::demo(),
         ["report-picture"] => chores::report_picture(),
         ["report-check", ref rest @ ..] => report_check::check(rest),
+        ["site", ref rest @ ..] => gallery::site(rest),
         ["test"] => chores::test(std::env::var_os("RUNOUT_REQUIRE_FOREIGN").is_some_and(|value| value == "1"), false),
         ["test", "--ci"] => chores::test(true, true),
         ["fuzz", ref rest @ ..] => fuzz::fuzz(rest),

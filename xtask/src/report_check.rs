@@ -21,7 +21,7 @@ const ROUNDS: usize = 7;
 /// Stations of the large report.
 const MANY: usize = 400;
 
-/// Runs all examples with a report each, looks at every page, and prints the table of docs/report.md.
+/// Runs all examples with a report each, looks at every page, and prints a table of size and time.
 pub(crate) fn check(words: &[&str]) -> Outcome {
     let program = match words {
         [] => {
@@ -36,7 +36,7 @@ pub(crate) fn check(words: &[&str]) -> Outcome {
     if folder.exists() {
         fs::remove_dir_all(&folder).map_err(|error| format!("cannot remove {}: {error}", folder.display()))?;
     }
-    results::run_examples(&folder, &program, &with_report)?;
+    results::run_examples(&folder, &program, &with_report, &mut |_| Ok(()))?;
     let first = folder.join("examples").join(FIRST);
     many_stations(&program, &first)?;
     let looked = look(&folder.join("examples"));
@@ -46,7 +46,7 @@ pub(crate) fn check(words: &[&str]) -> Outcome {
 }
 
 /// Adds a report to every pipeline that has none.
-fn with_report(example: &Path) -> std::io::Result<()> {
+pub(crate) fn with_report(example: &Path) -> std::io::Result<()> {
     for entry in fs::read_dir(example)? {
         let path = entry?.path();
         if path.extension().is_none_or(|extension| extension != "toml") {

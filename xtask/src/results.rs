@@ -26,11 +26,17 @@ pub(crate) fn record(words: &[&str]) -> Outcome {
         [folder, program] => (Path::new(folder), PathBuf::from(program)),
         _ => return Err("usage: cargo xtask record-results FOLDER [PROGRAM]".into()),
     };
-    run_examples(folder, &program, &|_| Ok(()))
+    run_examples(folder, &program, &|_| Ok(()), &mut |_| Ok(()))
 }
 
-/// Runs the commands of all examples' READMEs in a copy of the examples; each copy is prepared before.
-pub(crate) fn run_examples(folder: &Path, program: &Path, prepare: &dyn Fn(&Path) -> std::io::Result<()>) -> Outcome {
+/// Runs the commands of all examples' READMEs in a copy of the examples. `prepare` gets the folder of each copy before its first command,
+/// `after` gets it after each command.
+pub(crate) fn run_examples(
+    folder: &Path,
+    program: &Path,
+    prepare: &dyn Fn(&Path) -> std::io::Result<()>,
+    after: &mut dyn FnMut(&Path) -> Outcome,
+) -> Outcome {
     let program = program.canonicalize().map_err(|error| format!("cannot find {}: {error}", program.display()))?;
     let failed = |error: std::io::Error| format!("cannot write to {}: {error}", folder.display());
     fs::create_dir_all(folder).map_err(failed)?;
@@ -40,6 +46,10 @@ pub(crate) fn run_examples(folder: &Path, program: &Path, prepare: &dyn Fn(&Path
     if data.is_dir() {
         copy(&data, &folder.join("target/data")).map_err(failed)?;
     }
+    // Blocks that need a shell name the program by this path.
+    let own = folder.join(PROGRAM);
+    fs::create_dir_all(own.parent().unwrap_or(&folder)).map_err(failed)?;
+    fs::copy(&program, &own).map_err(failed)?;
     let mut examples: Vec<PathBuf> = fs::read_dir(root().join("examples"))
         .map_err(|error| format!("cannot read examples/: {error}"))?
         .filter_map(|entry| Some(entry.ok()?.path()))
@@ -53,18 +63,18 @@ pub(crate) fn run_examples(folder: &Path, program: &Path, prepare: &dyn Fn(&Path
         prepare(&copied).map_err(failed)?;
         let text = fs::read_to_string(example.join("README.md"))
             .map_err(|error| format!("cannot read {}: {error}", example.display()))?;
-        for (number, line) in commands(&text).into_iter().enumerate() {
-            let words = words_of(&line);
+        for (number, mut command) in runs(&text, &own).into_iter().enumerate() {
+            let words: Vec<_> = command.get_args().map(std::ffi::OsStr::to_string_lossy).collect();
             say(&format!("$ runout {}", words.join(" ")));
-            let output = Command::new(&program)
-                .args(&words)
+            let output = command
                 .current_dir(&folder)
                 .output()
-                .map_err(|error| format!("cannot start {}: {error}", program.display()))?;
+                .map_err(|error| format!("cannot start {}: {error}", command.get_program().display()))?;
             if !output.status.success() {
                 say(&format!("  {}: {}", output.status, String::from_utf8_lossy(&output.stderr).trim_end()));
             }
             fs::write(copied.join(format!("{number}.txt")), output.stdout).map_err(failed)?;
+            after(&copied)?;
         }
     }
     Ok(())
@@ -73,6 +83,26 @@ pub(crate) fn run_examples(folder: &Path, program: &Path, prepare: &dyn Fn(&Path
 /// Compares the numbers of two recorded folders, to 1e-12 relative or to what is given.
 pub(crate) fn compare(words: &[&str]) -> Outcome {
     chores::studies(&[&["compare-results"], words].concat())
+}
+
+/// What runs the commands of a README: the program, or a shell for each block where one of them needs it.
+fn runs(text: &str, program: &Path) -> Vec<Command> {
+    let lines = commands(text);
+    if lines.iter().all(|line| !line.contains('$')) {
+        let run = |line: &String| {
+            let mut command = Command::new(program);
+            command.args(words_of(line));
+            command
+        };
+        return lines.iter().map(run).collect();
+    }
+    let blocks = text.split("```").skip(1).step_by(2).filter(|block| !commands(&format!("```{block}")).is_empty());
+    let shell = |block: &str| {
+        let mut command = Command::new("sh");
+        command.arg("-ec").arg(block.split_once('\n').map_or("", |(_, script)| script));
+        command
+    };
+    blocks.map(shell).collect()
 }
 
 /// The commands of a README, each on one line without its comment and the program's name.

@@ -32,7 +32,7 @@ fn report(args: &ConvertArgs) -> runout_core::Result<ConvertReport> {
     Ok(ConvertReport { lost: lost(&map, &output), output, input: MapReport::new(map) })
 }
 
-/// What the written file does not hold, in words.
+/// Not in the written file, in words.
 fn lost(map: &Map, output: &std::path::Path) -> Vec<String> {
     let is_sdf = output.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("sdf"));
     let is_h5 = output.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("h5"));
@@ -48,7 +48,7 @@ fn lost(map: &Map, output: &std::path::Path) -> Vec<String> {
         lost.push(format!("the standard uncertainty of a height, {std_nm} nm"));
     }
     if map.layers.len() > 1 {
-        lost.push(format!("the other maps of the file: it holds {}", map.layers.join(", ")));
+        lost.push(format!("the other maps of the file: it has {}", map.layers.join(", ")));
     }
     if !map.about.is_empty() {
         let names: Vec<&str> = map.about.iter().map(|(name, _)| name.as_str()).collect();

@@ -60,7 +60,7 @@ pub(crate) fn execute(args: &NewArgs, json: bool, registry: &Registry) -> Result
         next.push("give your numbers in [separate]".into());
     }
     if args.file.is_none() {
-        next.push("name your file in [load]; `runout inspect FILE` says what it holds".into());
+        next.push("name your file in [load]; `runout inspect FILE` shows its contents".into());
     }
     next.push(format!("runout check {0} && runout run {0}", output.display()));
     print(&NewReport { pipeline: output, method: args.method.clone(), next }, json, |report| {
@@ -125,7 +125,7 @@ fn load(file: &Path, folder: &Path, template: &str, rig: Option<&Rig>) -> Result
         return Ok(table("hdf5"));
     }
     let Some(report) = runout_channels::inspect(file)? else {
-        let help = "TDMS, MAT, HDF5, LVM, CSV, NumPy, Parquet, Arrow, UFF and WAV are read; `runout inspect` says what the file holds";
+        let help = "TDMS, MAT, HDF5, LVM, CSV, NumPy, Parquet, Arrow, UFF and WAV are read; `runout inspect` shows its contents";
         return Err(refused("it is no recording of named channels", help));
     };
     if report.suggestion.channels.is_empty() {

@@ -119,7 +119,7 @@ fn rig(sources: &Sources) -> Result<Rig, Failure> {
     let document = Document::parse(sources)?;
     let root = document.root();
     if root.get_ref().contains_key("rig") {
-        let fault = Fault::at("rig", "a rig file holds the keys of [rig] at top level");
+        let fault = Fault::at("rig", "a rig file has the keys of [rig] at top level");
         let help = "move what is under [rig] to a file of its own, and write `rig = \"that.toml\"` in the pipeline";
         return Err(document.diagnose(fault.help(help)).into());
     }
@@ -183,7 +183,7 @@ fn better_angles(rig: &Rig, args: &PlanArgs, progress: &Progress) -> Result<Opti
 fn too_tight(tight: &TooTight, clearance_deg: f64) -> Failure {
     let TooTight { section, sensors, most_deg } = tight;
     Failure::Name {
-        message: format!("{sensors} sensors of section `{section}` cannot stand {clearance_deg}deg apart"),
+        message: format!("{sensors} sensors of section `{section}` cannot be {clearance_deg}deg apart"),
         help: format!("--clearance {most_deg}deg leaves them room"),
     }
 }

@@ -1,4 +1,4 @@
-//! `runout plugins`: what is on board, and the keys of each.
+//! `runout plugins`: the built-in plugins, and the keys of each.
 
 use runout_core::{
     effects::EffectEntry,

@@ -113,7 +113,7 @@ fn include(properties: &mut Map<String, Value>) {
     if let Some(rig) = properties.get_mut("rig") {
         let inline = rig.take();
         *rig = json!({
-            "description": "Sensors and setups, or the path of a file that holds them.",
+            "description": "Sensors and setups, or the path of a file that has them.",
             "anyOf": [{ "type": "string" }, inline],
         });
     }

@@ -34,7 +34,7 @@ pub(crate) fn converted(report: &ConvertReport) -> String {
     let mut page = Page::default();
     map(&mut page, &report.input);
     page.line(format_args!("  written: {}", report.output.display()));
-    page.bullets("What the written file does not hold", &report.lost);
+    page.bullets("Not in the written file", &report.lost);
     page.into_text()
 }
 

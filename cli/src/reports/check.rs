@@ -98,7 +98,7 @@ pub(crate) struct Stage {
 pub(crate) struct RigSize {
     /// Displacement sensors.
     pub sensors: usize,
-    /// Circles of the part that they look at.
+    /// Circles of the part that they measure.
     pub sections: usize,
     /// Setups.
     pub setups: usize,

@@ -102,7 +102,7 @@ pub(crate) struct Suggested {
     /// Of a sensor: the section that it measures.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub section: Option<String>,
-    /// Of a sensor: where it stands.
+    /// Of a sensor: its angle.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub angle_deg: Option<f64>,
     /// Blind effects, "effect target", that would show with this.
@@ -122,7 +122,7 @@ pub(crate) struct Optimised {
     pub criterion: &'static str,
     /// Smallest angle between two sensors of one section.
     pub clearance_deg: f64,
-    /// How far each sensor may stand from where it should.
+    /// Largest deviation of each sensor from its nominal angle.
     pub angle_tolerance_deg: f64,
     /// Seed of the search.
     pub seed: u64,
@@ -142,7 +142,7 @@ pub(crate) struct Optimised {
 pub(crate) struct Arrangement {
     /// By sensor.
     pub angles_deg: Vec<f64>,
-    /// With every sensor where it should stand.
+    /// With every sensor at its nominal angle.
     pub nominal: Score,
     /// The worst of the placements within the angle tolerance.
     pub within_tolerance: Score,

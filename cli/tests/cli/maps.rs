@@ -30,7 +30,7 @@ fn a_map_is_written_in_another_format() {
     for name in ["map.x3p", "map.sdf", "map.h5"] {
         let ran = folder.run(&["convert", &data("objects.sur"), name, "--layer", "right"]);
         assert_eq!(ran.status, 0, "{}", ran.stderr);
-        assert!(ran.stdout.contains("the other maps of the file: it holds left, right"), "{}", ran.stdout);
+        assert!(ran.stdout.contains("the other maps of the file: it has left, right"), "{}", ran.stdout);
         let again = folder.run(&["convert", name, "again.x3p", "--json"]);
         let document: Value = serde_json::from_str(&again.stdout).unwrap();
         assert_eq!(document["input"]["voids"], 2, "{name}");

@@ -124,7 +124,7 @@ fn an_interrupted_program_leaves_nothing() {
     let output = child.wait_with_output().unwrap();
     let said = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(130), "{said}");
-    assert!(said.contains("interrupted: what was not finished is taken away"), "{said}");
+    assert!(said.contains("interrupted: unfinished output files were removed"), "{said}");
     assert!(!out.exists());
 }
 

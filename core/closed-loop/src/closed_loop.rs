@@ -335,20 +335,20 @@ impl<M: Model> Tracing<'_, M> {
         self.refused.push(Refused { effect: named.id.clone(), targets: named.targets.clone(), reason });
     }
 
-    /// Limits that ended the search while the data may hold more.
+    /// Limits that ended the search while the data may contain more.
     fn ended_by_limits(&self) -> Vec<String> {
         let of_lists = |found: &Found| {
             let effect = found.members[0];
             let limit = self.model.last_of_list(effect)?;
             Some(format!(
-                "`{}` was added, the last of its list ({limit}): the data may hold more",
+                "`{}` was added, the last of its list ({limit}): the data may contain more",
                 self.model.effects()[effect].id
             ))
         };
         let mut said: Vec<String> = self.found.iter().filter_map(of_lists).collect();
         if self.found.len() >= self.settings.max_added {
             said.push(format!(
-                "{} effects were added, the most that are allowed: the data may hold more",
+                "{} effects were added, the most that are allowed: the data may contain more",
                 self.found.len()
             ));
         }

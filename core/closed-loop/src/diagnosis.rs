@@ -20,7 +20,7 @@ pub struct Diagnosis {
     /// Whether the layout separates nothing: no order of form is observable, and the residual says nothing of the readings.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub nothing_separated: bool,
-    /// Values that people look at, before and after.
+    /// Key values before and after.
     pub moved: Vec<Moved>,
     /// What no known effect explains.
     pub unexplained: Vec<Unexplained>,
@@ -75,10 +75,10 @@ impl Diagnosis {
             Verdict::Explained => "Explained: with what was added, noise only is left",
             Verdict::Unexplained => "Unexplained: something is left that no known effect explains",
             Verdict::Improved => {
-                "Improved: effects were added. The noise level is not known, so the residual may hold more"
+                "Improved: effects were added. The noise level is not known, so the residual may contain more"
             }
             Verdict::NothingFound => {
-                "Nothing found: no effect was added. The noise level is not known, so the residual may hold more"
+                "Nothing found: no effect was added. The noise level is not known, so the residual may contain more"
             }
         }
     }
@@ -94,9 +94,9 @@ pub enum Verdict {
     Explained,
     /// More than the known noise is left, and no known effect explains it.
     Unexplained,
-    /// Effects were added. The data may hold more: the noise level is not known, or nothing else is redundant.
+    /// Effects were added. The data may contain more: the noise level is not known, or nothing else is redundant.
     Improved,
-    /// No effect was added. The data may hold more: the noise level is not known, or the residual has no degrees of freedom.
+    /// No effect was added. The data may contain more: the noise level is not known, or the residual has no degrees of freedom.
     NothingFound,
 }
 
@@ -291,7 +291,7 @@ pub struct Unexplained {
     /// The station, where there are several.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub station: Option<String>,
-    /// Whose readings hold it, where it is one sensor's.
+    /// The sensor whose readings have it, where it is one.
     pub sensor: Option<String>,
     /// In which setup, where it is in one.
     pub setup: Option<String>,

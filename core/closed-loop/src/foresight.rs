@@ -15,7 +15,7 @@ use runout_numerics::least_squares::{dot, norm, orthonormal};
 /// What a measurement could show of each effect.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
 pub struct Foresight {
-    /// The measurement that the figures hold for, in words.
+    /// The measurement that the figures are valid for, in words.
     pub assuming: String,
     /// Effects of which the usual size would show.
     pub visible: Vec<Visible>,

@@ -164,7 +164,7 @@ impl Judgement {
             let check = Check::new(Test::Blocks, &partition.name, statistic.ratio, &dof, p.min(1.0));
             let check = check.finding(|| {
                 format!(
-                    "{blocks} {} disagree: of {of} they scatter {:.1} times as far as the residual lets expect",
+                    "{blocks} {} disagree: of {of} they scatter {:.1} times as far as expected from the residual",
                     partition.name,
                     statistic.ratio.sqrt()
                 )

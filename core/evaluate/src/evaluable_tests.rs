@@ -167,13 +167,13 @@ fn print_shares(text: &str, trials: u64) {
 }
 
 #[test]
-#[ignore = "prints the table of docs/values.md, which takes a minute"]
+#[ignore = "prints the table of docs/appendix/texture.md, which takes a minute"]
 fn intervals_of_straightness_by_noise() {
     print_shares("values = ['straightness']", 400);
 }
 
 #[test]
-#[ignore = "prints shares of docs/values.md, which takes many minutes"]
+#[ignore = "prints shares of docs/appendix/texture.md, which takes many minutes"]
 fn intervals_of_open_texture_by_noise() {
     print_shares(ALL, 200);
 }

@@ -34,7 +34,7 @@ pub enum Decision {
     Conforms,
     /// Non-conformity is proven: the whole interval lies beyond a limit.
     DoesNotConform,
-    /// Neither is proven: the interval holds a limit, there is no uncertainty to decide with, or something of the value's band
+    /// Neither is proven: the interval contains a limit, there is no uncertainty to decide with, or something of the value's band
     /// is not in it.
     Undecided,
 }

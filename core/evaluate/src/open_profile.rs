@@ -132,7 +132,7 @@ fn with_reason(
 ) -> Found {
     let reason = match (drawn, sensitivity) {
         (Ok(drawn), Ok(sensitivity)) if drawn.share() > largest_share(sensitivity) => {
-            share_in_words(drawn.share()) + "; of an open profile no interval holds 95 % then"
+            share_in_words(drawn.share()) + "; of an open profile no interval has 95 % coverage then"
         }
         (Ok(drawn), sensitivity) => {
             let found = found(Some(drawn), index, value, sensitivity);
@@ -154,7 +154,7 @@ fn with_uncertain_shift(mut found: Found) -> Found {
         let share = shift.abs() / known.std;
         found.uncertainty = None;
         found.no_uncertainty = Some(format!(
-            "errors shift it by {share:.1} standard uncertainties; of an open profile no interval holds 95 % then"
+            "errors shift it by {share:.1} standard uncertainties; of an open profile no interval has 95 % coverage then"
         ));
         return found;
     }

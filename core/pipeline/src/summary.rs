@@ -167,7 +167,7 @@ pub struct StationSummary {
 }
 
 impl Summary {
-    /// Stations whose residual is not what the noise of their readings lets expect: those of a finding in `consistency`.
+    /// Stations whose residual differs from that expected from the noise of their readings: those of a finding in `consistency`.
     pub fn misfits(&self) -> impl Iterator<Item = &StationSummary> + Clone {
         misfits(&self.stations, &self.consistency)
     }

@@ -220,14 +220,14 @@ impl Moments {
     pub fn uncertainty(&self, value: f64, sensitivity: Sensitivity) -> Result<Uncertainty, String> {
         let Self { about, shift, std, share, draws, lowest } = *self;
         if share.is_nan() || share > sensitivity.largest_share() {
-            return Err(share_in_words(share) + "; no interval holds 95 % then");
+            return Err(share_in_words(share) + "; no interval has 95 % coverage then");
         }
         let rounding = 1e-12 * about.abs();
         if shift.abs() > sensitivity.largest_shift() * std + rounding {
             let share = shift.abs() / std;
             let direction = if shift > 0.0 { "raise" } else { "lower" };
             return Err(format!(
-                "errors {direction} it by {share:.1} standard uncertainties; no interval holds 95 % then"
+                "errors {direction} it by {share:.1} standard uncertainties; no interval has 95 % coverage then"
             ));
         }
         let floor = if lowest >= 0.0 { 0.0 } else { f64::NEG_INFINITY };

@@ -96,7 +96,7 @@ pub fn twist(map: &HeightMap) -> Result<Twist, String> {
     }
     let lines = Lines::new(map);
     let Some((threads, frequency)) = lines.strongest() else {
-        return failure("no helix stands out of the surface's spectrum");
+        return failure("no helix is significant in the surface's spectrum");
     };
     let frequency = lines.refined(threads, frequency);
     // Below this, rings have less than two points of a wave.

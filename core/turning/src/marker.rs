@@ -10,7 +10,7 @@ use runout_error::fault::Fault;
 #[derive(Debug, Clone, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Marker {
-    /// Name of the channel that holds the trace.
+    /// Name of the channel with the trace.
     pub channel: String,
     /// Where the trace crosses this value a turn begins, in the unit of the channel.
     pub threshold: f64,

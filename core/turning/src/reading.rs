@@ -35,7 +35,7 @@ pub struct ReadingValues {
     pub tir_uncertainty: Option<Uncertainty>,
     /// Once per revolution: eccentricity of the part and motion of the axis.
     pub once_per_rev: ReadingHarmonic,
-    /// Orders from 2 to 15, as far as the average holds them.
+    /// Orders from 2 to 15, as far as the average has them.
     pub harmonics: Vec<ReadingHarmonic>,
     /// Standard deviation of single turns about their mean at one angle (root mean square over the turn), in µm; null below two
     /// turns.

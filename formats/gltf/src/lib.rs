@@ -50,7 +50,7 @@ fn write(mesh: &Mesh, notes: &Notes, file: &mut File) -> io::Result<()> {
     let mut json = document::json(&layout, notes)?;
     json.resize(json.len().next_multiple_of(4), b' ');
     let binary = layout.vertex_bytes() + layout.index_bytes();
-    let too_long = |_| io::Error::other("a GLB holds at most 4 GiB: take fewer angles or points, or a larger step_mm");
+    let too_long = |_| io::Error::other("a GLB has at most 4 GiB: take fewer angles or points, or a larger step_mm");
     let whole = u32::try_from(12 + 8 + json.len() + 8 + binary).map_err(too_long)?;
     let mut head = Vec::with_capacity(json.len() + 28);
     head.extend_from_slice(b"glTF");

@@ -198,7 +198,7 @@ impl Links {
         let elements = dataset.shape().iter().try_fold(bytes, |product, side| product.checked_mul(*side as u64));
         match elements {
             Some(declared) if declared <= held => Ok(()),
-            _ => Err(format!("the shape {:?} was declared, but its files hold {held} bytes", dataset.shape())),
+            _ => Err(format!("the shape {:?} was declared, but its files have {held} bytes", dataset.shape())),
         }
     }
 
@@ -238,7 +238,7 @@ pub(crate) fn within(shape: &[usize], element: u64, held: u64) -> Result<(), Str
     if declared.is_some_and(|declared| declared <= ALLOWANCE.max(held.saturating_mul(DENSEST))) {
         return Ok(());
     }
-    Err(format!("{shape:?} elements of {element} bytes are declared, and its files hold {held} bytes"))
+    Err(format!("{shape:?} elements of {element} bytes are declared, and its files have {held} bytes"))
 }
 
 /// Refuses what needs a filter that is not linked in.

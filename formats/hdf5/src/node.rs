@@ -361,5 +361,5 @@ pub(crate) fn put_list<T: H5Type>(location: &Location, name: &str, values: &[T])
 
 /// A text as HDF5 holds it, without NUL, which would end it.
 pub(crate) fn unicode(text: &str) -> hdf5_metno::Result<VarLenUnicode> {
-    text.parse().map_err(|_| format!("a text must not hold NUL: {text:?}").into())
+    text.parse().map_err(|_| format!("a text must not contain NUL: {text:?}").into())
 }

@@ -65,7 +65,7 @@ fn what_has_no_end_is_an_error_at_once() {
     for (name, follow_links, words) in [
         ("soft-circle", false, "links without end"),
         ("virtual-itself", true, "a virtual data set itself"),
-        ("external-storage-endless", true, "its files hold 9600 bytes"),
+        ("external-storage-endless", true, "its files have 9600 bytes"),
         ("one-chunk", false, "a chunk of it is too large"),
         ("pipe-link", true, "a pipe"),
         ("pipe", false, "a pipe"),

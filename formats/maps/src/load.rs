@@ -27,7 +27,7 @@ pub struct HeightMapConfig {
     /// File with heights on a grid, or a profile, relative to the TOML: X3P (ISO 25178-72), SDF (ISO 25178-71), SUR (Digital Surf), HDF5 (runout-surface,
     /// version 1), or text (`x y z`, or a row of heights a line). Its first bytes decide.
     pub path: PathBuf,
-    /// Name or number, from 1, of the map in a file that holds several; without it the first one.
+    /// Name or number, from 1, of the map in a file of several; without it the first one.
     #[serde(default)]
     pub layer: Option<String>,
     /// Unit of the heights of a file that names none; of text also that of its coordinates: m, mm, um, nm, in, mil.

@@ -45,7 +45,7 @@ impl Wanted {
         let Some(layer) = &self.layer else {
             let others = (names.len() > 1).then(|| {
                 format!(
-                    "the file holds {} maps ({}); the first one is read: `layer` in [load] names another",
+                    "the file has {} maps ({}); the first one is read: `layer` in [load] names another",
                     names.len(),
                     names.join(", ")
                 )

@@ -68,7 +68,7 @@ pub(crate) fn read(input: &Input, wanted: &Wanted) -> Result<Map> {
     }
     objects.retain(|object| HEIGHTS.contains(&object.kind) || object.kind == SURFACE_WITH_PICTURES);
     if objects.is_empty() {
-        return Err(Error::new("read", shown, "it holds pictures or spectra and no heights"));
+        return Err(Error::new("read", shown, "it has pictures or spectra and no heights"));
     }
     let named = objects.iter().enumerate();
     let layers: Vec<String> = named
@@ -223,7 +223,7 @@ impl Object {
             std::io::copy(&mut stream, &mut std::io::sink()).map_err(io)?;
         }
         if heights.len() != count {
-            return Err(damaged(shown, format!("its streams hold {} of {count} points", heights.len())));
+            return Err(damaged(shown, format!("its streams have {} of {count} points", heights.len())));
         }
         Ok(heights)
     }

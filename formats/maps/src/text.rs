@@ -106,7 +106,7 @@ pub(crate) fn read(input: &Input, wanted: &Wanted) -> Result<Map> {
 
 fn no_map(shown: &str) -> Error {
     let help = "maps are X3P, SDF, SUR, HDF5 (runout-surface), or text with `x y z` or a row of heights a line";
-    damaged(shown, "it holds no table of numbers: it is of none of the formats of maps").help(help)
+    damaged(shown, "it has no table of numbers: it is of none of the formats of maps").help(help)
 }
 
 fn begins_with_number(line: &str) -> bool {

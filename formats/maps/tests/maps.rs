@@ -66,7 +66,7 @@ fn files_say_what_they_leave_out() {
     let of = |name: &str| read(&data().join(name), &Wanted::default());
     let layers = of("layers.x3p").unwrap();
     assert_eq!(layers.layers, ["layer 1", "layer 2", "layer 3"]);
-    assert!(layers.remarks[0].contains("holds 3 maps"), "{:?}", layers.remarks);
+    assert!(layers.remarks[0].contains("has 3 maps"), "{:?}", layers.remarks);
     assert_eq!(of("objects.sur").unwrap().layers, ["left", "right"], "the picture is no map");
     let no_unit = of("bits16.sur").unwrap_err();
     assert!(no_unit.to_string().contains("`a.u.`") && no_unit.to_string().contains("no length"), "{no_unit}");

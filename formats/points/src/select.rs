@@ -40,7 +40,7 @@ pub(crate) fn points(
     file.has_all(wanted, coordinates.is_some())?;
     let rows = file.selected(config)?;
     if rows.is_empty() {
-        let problem = if file.table.rows == 0 { "it holds no points" } else { "no point has the values of `where`" };
+        let problem = if file.table.rows == 0 { "it has no points" } else { "no point has the values of `where`" };
         return Err(Error::new("read", file.file, problem));
     }
     let mut points = Points { input: path.to_path_buf(), opened: vec![input.clone()], ..Points::default() };

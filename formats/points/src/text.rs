@@ -24,7 +24,7 @@ pub(crate) fn read(input: &InputFile, given: Option<&[String]>) -> Result<RawTab
     let (separator, first) = separator(&mut file).map_err(|error| failed(&shown, error))?;
     let is_number = |word: &str| word.trim().replace(',', ".").parse::<f64>().is_ok();
     if given.is_none() && !first.is_empty() && first.iter().all(|word| is_number(word)) {
-        let problem = format!("its first line holds {} numbers and no names of columns", first.len());
+        let problem = format!("its first line has {} numbers and no names of columns", first.len());
         return Err(Error::new("read", format!("{shown}, line 1"), problem)
             .help("`names = [\"x_mm\", …]` in [load] names them in their order"));
     }

@@ -23,7 +23,7 @@ use crate::{
 const ROUNDS: usize = 3;
 /// Strangers that are listed.
 const LISTED: usize = 5;
-/// Values that people look at, before and after.
+/// Key values before and after.
 const LOOKED_AT: [&str; 3] = ["Sq", "Sz", "Sa"];
 /// What separates ratios of a line.
 const DISTINGUISHED_BY: &str =

@@ -229,7 +229,7 @@ impl LowPassStream<'_> {
     fn finish(&mut self, block: &mut Block) -> Result<bool> {
         if self.stage == Stage::Filling {
             let frames = self.held.samples.len() / self.channels().max(1);
-            let problem = format!("it holds {frames} samples, the filter needs more than {}", self.pad);
+            let problem = format!("it has {frames} samples, the filter needs more than {}", self.pad);
             return Err(Error::new("low-pass", &self.capture.object, problem).of(ErrorKind::InsufficientData));
         }
         self.stage = Stage::Done;

@@ -53,7 +53,7 @@ use crate::{interruptions, low_pass::significant};
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SynchronousAverageConfig {
-    /// Equal angles per turn of the average, 4 to 131072; it holds the orders below half of them, as far as the recording
+    /// Equal angles per turn of the average, 4 to 131072; it has the orders below half of them, as far as the recording
     /// has them. Above 4096, and far above the recording's own samples a turn (8 times, rounded up to a power of two), fewer are
     /// used, with a warning.
     pub samples_per_rev: usize,
@@ -173,7 +173,7 @@ impl SynchronousAverage {
         }
         if self.max_order() > orders_held(turn) {
             warnings.push(format!(
-                "{turn:.0} samples a turn hold no orders above {}: the average ends there, on {} angles",
+                "{turn:.0} samples a turn have no orders above {}: the average ends there, on {} angles",
                 orders_held(turn),
                 angles
             ));

@@ -183,8 +183,8 @@ impl LinearModel for RTest {
             used.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], (_, c)| [low.min(*c), high.max(*c)]);
         if used.len() < FEW_POINTS {
             remarks.push(format!(
-                "{} points a coordinate (C = {low}° to {high}°) are few: {dof} degrees of freedom are left in all, so that \
-                 {rms:.2} µm rms left, where {} µm is stated, confirms little",
+                "{} points a coordinate (C = {low}° to {high}°) are few: too few degrees of freedom ({dof}) to test the stated \
+                 noise of {} µm by the residual of {rms:.2} µm rms",
                 used.len(),
                 self.0.std_um
             ));

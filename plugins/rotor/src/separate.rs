@@ -160,7 +160,7 @@ impl Solution {
         }
         if let Some((number, mode)) = unstable(&self.at_rest) {
             remarks.push(format!(
-                "mode {number} grows by itself at rest (damping ratio {:.2e}): look at the cross-coupling of the bearings",
+                "mode {number} grows by itself at rest (damping ratio {:.2e}): check the cross-coupling of the bearings",
                 mode.damping_ratio()
             ));
         }

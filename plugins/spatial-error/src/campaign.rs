@@ -110,7 +110,7 @@ impl Campaign {
             }
         }
         if count == 0 {
-            return Err(refuse("it holds no reading".into()));
+            return Err(refuse("it has no reading".into()));
         }
         let rows: Vec<[f64; 3]> = (0..count).map(|row| commands.map(|column| column[row])).collect();
         let (places_mm, place_of) = distinct(&rows);

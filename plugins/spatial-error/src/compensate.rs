@@ -103,7 +103,7 @@ impl Axis {
             return refuse("`direction` has no length");
         }
         if self.point_mm.is_some_and(|point| point.iter().any(|value| !value.is_finite())) {
-            return refuse("`point_mm` holds a number that is not finite");
+            return refuse("`point_mm` has a number that is not finite");
         }
         match (self.kind, self.point_mm, self.limit_um, self.limit_urad) {
             (Kind::Rotary, None, ..) => return refuse("a rotary axis needs `point_mm`, a point of its line"),

@@ -18,7 +18,7 @@ use crate::{
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SpatialErrorConfig {
-    /// What is always fitted: `rigid` (how the tracker stood: three displacements, three rotations), `translation` (ordinary
+    /// What is always fitted: `rigid` (placement of the tracker: three displacements, three rotations), `translation` (ordinary
     /// kriging), nothing (a field of mean zero).
     #[serde(default = "rigid")]
     pub declared: Vec<Declared>,

@@ -114,7 +114,7 @@ fn read(path: &std::path::Path) -> Result<Vec<[f64; 3]>> {
         places.push(place);
     }
     if places.is_empty() {
-        return Err(refuse("it holds no place".into()));
+        return Err(refuse("it has no place".into()));
     }
     Ok(places)
 }

@@ -60,7 +60,7 @@ pub(crate) fn notes(conclusion: &Conclusion, queries: &[At]) -> Vec<String> {
         all.push(format!("{extrapolated} of {} predictions are extrapolations, which the table flags", queries.len()));
     }
     if separator.config.kriging.fixed().is_some() {
-        all.push("the covariance is given, not estimated: standard uncertainties hold as far as it does".into());
+        all.push("the covariance is given, not estimated: standard uncertainties are right if it is".into());
     }
     if !campaign.timed {
         all.push("no column `time_s`: rows count as evenly spaced in time".into());

@@ -69,7 +69,7 @@ impl PointSeparator for SpatialError {
             ));
         }
         if self.config.declared.contains(&Declared::Translation) && self.config.declared.contains(&Declared::Rigid) {
-            notes.push("`rigid` holds `translation`".into());
+            notes.push("`rigid` contains `translation`".into());
         }
         notes
     }

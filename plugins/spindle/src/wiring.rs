@@ -341,7 +341,7 @@ pub(crate) fn copies(rig: &Rig, readings: &Readings) -> Vec<String> {
     let mut found: Vec<String> = setup_copies
         .map(|pair| {
             let [first, second] = pair.map(|setup| &rig.setups[setup].id);
-            format!("setups `{first}` and `{second}` hold the same recording: one of them was stored twice")
+            format!("setups `{first}` and `{second}` have the same recording: one of them was stored twice")
         })
         .collect();
     let channel_copies = pairs(sensors)
@@ -349,7 +349,7 @@ pub(crate) fn copies(rig: &Rig, readings: &Readings) -> Vec<String> {
         .filter(|[first, second]| (0..setups).all(|setup| same(setup * sensors + first, setup * sensors + second)));
     found.extend(channel_copies.map(|pair| {
         let [first, second] = pair.map(|sensor| &rig.sensors[sensor].id);
-        format!("channels `{first}` and `{second}` hold the same signal: one of them was recorded twice")
+        format!("channels `{first}` and `{second}` have the same signal: one of them was recorded twice")
     }));
     found
 }

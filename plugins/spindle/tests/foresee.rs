@@ -1,4 +1,4 @@
-//! What a rig would show of each effect before anyone measures: against what is known of the layouts of `docs/physics.md`,
+//! What a rig would show of each effect before anyone measures: against what is known of the layouts of `docs/appendix/physics.md`,
 //! and against what the closed loop finds in simulated campaigns, which share no formula with it.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, clippy::panic, reason = "tests")]

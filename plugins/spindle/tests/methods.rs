@@ -184,7 +184,7 @@ fn multi_step_loses_multiples_of_its_steps() {
     }
 }
 
-/// `docs/physics.md` section 2: noise gain of form for 0/99.844/202.5.
+/// `docs/appendix/physics.md` section 2: noise gain of form for 0/99.844/202.5.
 #[test]
 fn noise_gain_of_the_reference_three_point() {
     let rig = rig(&[(0.0, 0.0, "a"), (99.844, 0.0, "a"), (202.5, 0.0, "a")], &[(0.0, 0.0)]);

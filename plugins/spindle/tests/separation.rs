@@ -124,7 +124,7 @@ fn a_clockwise_part_gives_the_same_form_and_motion() {
 #[test]
 fn the_papers_assumption_mixes_even_motion_into_form_and_shows_in_the_residual() {
     let rig = rig(&FOUR_SENSORS, &FIXED_REVERSAL);
-    // Form 4.5 and motion 2 µm rms, as in `docs/physics.md` section 3.
+    // Form 4.5 and motion 2 µm rms, as in `docs/appendix/physics.md` section 3.
     let scaled = |sum: common::Sum, rms: f64| {
         let now = (0.5 * sum.iter().map(|(_, amplitude, _)| amplitude * amplitude).sum::<f64>()).sqrt();
         sum.into_iter().map(|(order, amplitude, phase)| (order, amplitude * rms / now, phase)).collect::<common::Sum>()
@@ -157,7 +157,7 @@ fn the_papers_assumption_mixes_even_motion_into_form_and_shows_in_the_residual()
 /// Name, rig, unknowns an order, whether an order is lost, residual degrees of freedom.
 type Case<'a> = (&'a str, Rig, usize, &'a dyn Fn(usize) -> bool, &'a dyn Fn(usize) -> usize);
 
-/// `docs/physics.md` section 2, orders 1 to 80: lost orders and residual degrees of freedom.
+/// `docs/appendix/physics.md` section 2, orders 1 to 80: lost orders and residual degrees of freedom.
 #[test]
 fn lost_orders_and_degrees_of_freedom_of_the_reference_layouts() {
     let three = [(0.0, 0.0, "a"), (99.844, 0.0, "a"), (202.5, 0.0, "a")];

@@ -33,8 +33,7 @@ pub(crate) fn common_range(file: &Path, all: &[&AxialTrace]) -> Result<[f64; 2]>
                 .help("all traces have to share a range of z, in the part's own coordinate"))
         }
         _ => {
-            Err(Error::new("separate", file.display().to_string(), "it holds no traces")
-                .of(ErrorKind::InsufficientData))
+            Err(Error::new("separate", file.display().to_string(), "it has no traces").of(ErrorKind::InsufficientData))
         }
     }
 }

@@ -360,7 +360,7 @@ impl AxialReversal {
                 };
                 format!(
                     "uncertainty is the scatter of {first} and {second} aligned traces, {dof} degrees of freedom a \
-                     position{single}; it holds nothing that the traces of a setup share"
+                     position{single}; it does not include what the traces of a setup share"
                 )
             }
         });

@@ -13,7 +13,7 @@ use crate::{moves::rms, value_std::ProfileErrors};
 
 /// What the numbers are, for files that explain themselves.
 pub(crate) const CONVENTION: &str = "Straightness along z about the least-squares line (LSLI, ISO 12780-1). part_um is \
-    positive where the part stands out towards the probe; slide_um is the slide's displacement towards the part in the \
+    positive where the part protrudes towards the probe; slide_um is the slide's displacement towards the part in the \
     initial setup. Standard uncertainties are those of one position, from the scatter of repeated traces; NaN if not \
     known.";
 

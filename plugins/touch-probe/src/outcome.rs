@@ -194,7 +194,7 @@ impl Found<'_> {
                     let moved = self.touches.centre_um[*setup][axis];
                     [moved + self.fit.solved.coefficients[place], self.fit.covariance(place, place).sqrt()]
                 });
-                let about = "centre of the ring, from the nominal one; holds lobing of order 1";
+                let about = "centre of the ring, from the nominal one; contains lobing of order 1";
                 values.push(NamedValue::new(symbol, number, std, "um", about).of(&self.config.setups[*setup].id));
             }
         }

@@ -51,7 +51,7 @@ pub(crate) fn tables() -> Vec<TableSpec> {
                 ColumnSpec::count("order", "", "undulations per revolution"),
                 ColumnSpec::flag("lobing_lost", "whether lobing of this order is not observable"),
                 ColumnSpec::flag("form_lost", "whether form of the ring of this order is not observable"),
-                ColumnSpec::flag("bounded", "whether lobing holds the form of the ring, within its declared bound"),
+                ColumnSpec::flag("bounded", "whether lobing contains the form of the ring, within its declared bound"),
                 ColumnSpec::flag("evident", "whether lobing of this order is in the compensation"),
                 um("amplitude_um", "amplitude of lobing"),
                 um("std_amplitude_um", "its standard uncertainty"),

@@ -90,7 +90,7 @@ impl Touches {
         let direction = directions(&setups, &commanded);
         let repeat = match column("repeat") {
             Some(numbers) => whole(numbers).ok_or_else(|| {
-                Error::new("read", object(), "the column `repeat` holds a number that is not whole, or below 0")
+                Error::new("read", object(), "the column `repeat` has a number that is not whole, or below 0")
             })?,
             None => occurrences(&setups, &direction),
         };

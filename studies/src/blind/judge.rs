@@ -244,7 +244,7 @@ impl Judged {
                 failures.push(format!("{} missed", planted.id));
             }
         }
-        let alarm = if self.campaign.kind == Kind::Stranger { "blamed" } else { "false alarm" };
+        let alarm = if self.campaign.kind == Kind::Stranger { "effect added" } else { "false alarm" };
         failures.extend(self.false_alarms.iter().map(|name| format!("{alarm}: {name}")));
         let [farther, stated] = [self.form.sound, self.form.stated].map(|other| self.form.after / other);
         if self.is_distinguishable() && self.effects.iter().any(|traced| traced.visible) && farther > 1.5 {
@@ -260,10 +260,10 @@ impl Judged {
         }
         match self.campaign.kind {
             Kind::Stranger if !left && self.effects.iter().any(|traced| traced.visible && !traced.named) => {
-                failures.push("not said to be unexplained".into());
+                failures.push("not reported as unexplained".into());
             }
             Kind::Stranger => {}
-            _ if left => failures.push("something said to be left".into()),
+            _ if left => failures.push("something reported as unexplained".into()),
             _ => {}
         }
         failures

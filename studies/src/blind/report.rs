@@ -72,7 +72,7 @@ fn percent(some: usize, all: usize) -> String {
 
 fn clean(all: &[Judged]) -> String {
     let mut text = String::from(
-        "| clean campaigns | campaigns | false alarms | said to leave something |\n| --- | --- | --- | --- |\n",
+        "| clean campaigns | campaigns | false alarms | with an unexplained residual |\n| --- | --- | --- | --- |\n",
     );
     for rig in Layout::ALL {
         let these: Vec<&Judged> =
@@ -86,7 +86,7 @@ fn clean(all: &[Judged]) -> String {
 
 fn strangers(all: &[Judged]) -> String {
     let mut text = String::from(
-        "| stranger | campaigns | visible | said to be unexplained, none blamed | unexplained, and one blamed | explained away | visible and not said | form worse than before |\n\
+        "| unmodelled disturbance | campaigns | visible | unexplained, no effect added | unexplained, an effect added | an effect added, not unexplained | visible and not reported | form worse than before |\n\
          | --- | --- | --- | --- | --- | --- | --- | --- |\n",
     );
     for id in STRANGERS {

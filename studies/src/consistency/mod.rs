@@ -133,7 +133,7 @@ fn judge(kind: &Kind, chance: &mut Chance, folder: &Path) -> Result<(Summary, Di
 #[must_use]
 pub fn table(rows: &[(&Kind, Row)]) -> String {
     let mut text = String::from(
-        "| domain | data | campaigns | with a finding | named | false effects | \"noise only\" | 95 % intervals hold | median std |\n\
+        "| domain | data | campaigns | with a finding | named | false effects | \"noise only\" | 95 % intervals contain the truth | median std |\n\
          | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n",
     );
     for (kind, row) in rows {

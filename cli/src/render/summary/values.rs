@@ -64,7 +64,7 @@ fn decided(limit: &LimitSummary, worst: Option<&LimitValue>) -> String {
         (Decision::Undecided, Some(LimitValue { interval_95: None, within, .. })) => {
             format!("undecided: {}, without uncertainty", if *within { "within" } else { "beyond" })
         }
-        (Decision::Undecided, Some(_)) => "undecided: the interval holds the limit".into(),
+        (Decision::Undecided, Some(_)) => "undecided: the interval contains the limit".into(),
     }
 }
 
@@ -123,7 +123,7 @@ mod tests {
         let beyond = value([7.2, 7.3], Decision::DoesNotConform, None);
         for (values, decision, said) in [
             (vec![near.clone(), lacks.clone()], Decision::Undecided, "undecided: its filter passes more than there is"),
-            (vec![near.clone(), lacks, covers], Decision::Undecided, "undecided: the interval holds the limit"),
+            (vec![near.clone(), lacks, covers], Decision::Undecided, "undecided: the interval contains the limit"),
             (vec![near.clone(), beyond], Decision::DoesNotConform, "does not conform"),
             (vec![near], Decision::Conforms, "conforms"),
             (Vec::new(), Decision::Undecided, "undecided: no value"),

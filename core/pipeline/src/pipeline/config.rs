@@ -130,7 +130,7 @@ impl Pipeline {
             None => "Untitled".to_owned(),
             Some(value) => match value.get_ref().as_str() {
                 Some(title) if title.contains('\0') => {
-                    return Err(Fault::span(value.span(), "the title must not hold NUL, which ends a text in HDF5"));
+                    return Err(Fault::span(value.span(), "the title must not contain NUL, which ends a text in HDF5"));
                 }
                 Some(title) => title.to_owned(),
                 None => return Err(Fault::span(value.span(), "expected the title in quotes")),

@@ -116,7 +116,7 @@ fn place(creep: &Creep, station: &str, profile: Option<&Profile>, rig: &Rig) -> 
     format!("the capture {}/{station}", setup.map_or("", |setup| &setup.id))
 }
 
-/// Warns where the residual is far below what the noise measured over the turns lets expect.
+/// Warns where the residual is far below its value expected from the noise measured over the turns.
 pub(super) fn inflated(stations: &[StationSummary]) -> Option<String> {
     let is_low = |station: &&StationSummary| station.chi2_per_dof.is_some_and(|chi2| chi2 < INFLATED_CHI2);
     let has_orders = |station: &&StationSummary| {

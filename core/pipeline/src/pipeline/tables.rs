@@ -95,7 +95,7 @@ impl StationTables {
         let any = self.taken > 0 && every > 1;
         any.then(|| {
             format!(
-                "plots of all turns and spectra are of 1 in {every} stations: a result holds at most {}",
+                "plots of all turns and spectra are of 1 in {every} stations: a result has at most {}",
                 turn_tables::STATIONS
             )
         })

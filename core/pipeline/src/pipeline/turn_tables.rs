@@ -101,7 +101,7 @@ fn spectrum(motion: &Motion) -> TableSpec {
             .repeating(),
         column(
             "synchronous",
-            "amplitude of synchronous error motion; NaN at lost orders and at 1/rev, which holds the centring",
+            "amplitude of synchronous error motion; NaN at lost orders and at 1/rev, which contains the centring",
         ),
         column(
             "asynchronous",

@@ -156,7 +156,7 @@ fn misfit(stations: &[StationSummary], checks: &[Check], interrupted: bool) -> O
     let (chi2, dof) = (worst.chi2_per_dof.unwrap_or(f64::NAN), worst.residual_dof.unwrap_or(0));
     let decimals = if chi2 < 100.0 { 2 } else { 0 };
     let bridged =
-        if interrupted { " (or readings go astray where its interruptions are bridged: make them wider)" } else { "" };
+        if interrupted { " (or the bridged interruptions disturb readings: declare wider interruptions)" } else { "" };
     Some(format!(
         "at {count} of {} stations the readings contradict each other: χ² per degree of freedom is up to {chi2:.decimals$} ({}, {dof} degrees of \
          freedom), where noise makes 1, and the fit leaves {left:.4} µm rms; something is not as the rig declares it{bridged}, and the \

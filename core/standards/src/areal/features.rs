@@ -106,7 +106,7 @@ impl Features {
             )
         } else if self.cut_percent > MOST_CUT_PERCENT {
             format!(
-                "{:.0} % of the area are holes and what they cut; {MOST_CUT_PERCENT} % may be, so that the others stand for all",
+                "{:.0} % of the area are holes and what they cut; {MOST_CUT_PERCENT} % may be, so that the others are representative",
                 self.cut_percent
             )
         } else {

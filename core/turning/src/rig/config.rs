@@ -322,7 +322,7 @@ impl SensorConfig {
             (Looks::Axial, Some(radius_mm)) => {
                 let message =
                     format!("expected a distance from the axis of 0 to {FARTHEST_MM} mm, found {radius_mm:?}");
-                Err(Fault::at("radius_mm", message).help("the side on which it stands is its angle_deg"))
+                Err(Fault::at("radius_mm", message).help("the side on which it is placed is its angle_deg"))
             }
         }
     }
@@ -336,13 +336,13 @@ fn same_face(sensor: &SensorConfig, face: Option<f64>, axial_radius_mm: Option<f
         (Some(one_mm), Some(other_mm)) if (one_mm - other_mm).abs() <= SAME_SECTION_MM => Ok(()),
         (Some(one_mm), Some(other_mm)) => {
             let message = format!(
-                "axial sensors of section `{}` must share one radius: it is seen at {one_mm} mm, by `{}` at {other_mm} mm",
+                "axial sensors of section `{}` must share one radius: it is measured at {one_mm} mm, by `{}` at {other_mm} mm",
                 sensor.section, sensor.id
             );
             Err(Fault::at("radius_mm", message).help("give the sensor a section of its own"))
         }
         _ => {
-            let message = format!("section `{}` is seen both radially and axially", sensor.section);
+            let message = format!("section `{}` is measured both radially and axially", sensor.section);
             Err(Fault::at("looks", message).help(own))
         }
     }

@@ -112,7 +112,7 @@ impl SurfaceBuilder {
         if let Some(step) = self.config.step_mm {
             let points = ((end - start) / step + 2.0) * angles as f64;
             if points > MOST_POINTS {
-                let problem = format!("rings every {step} mm over {} mm are more than can be held", end - start);
+                let problem = format!("rings every {step} mm over {} mm are more than memory allows", end - start);
                 return Err(failure(problem).of(ErrorKind::Configuration).help("enlarge step_mm or take fewer angles"));
             }
         }

@@ -128,7 +128,7 @@ impl CaptureSource {
 /// Neither marks nor angles.
 fn neither(place: &Place) -> runout_core::Error {
     place.error(format!("expected a dataset `{INDEX}` or `{ANGLE}`, found neither")).help(
-        "where a channel holds the mark as a voltage, name it in [load]: marker = { channel = \"…\", threshold = …, hysteresis = … }",
+        "where a channel has the mark as a voltage, name it in [load]: marker = { channel = \"…\", threshold = …, hysteresis = … }",
     )
 }
 
@@ -200,7 +200,7 @@ fn positions(vector: &Vector, samples: usize) -> Result<Vec<f64>> {
         // A signal of 0 and 1 has a value a sample.
         let is_signal = vector.length() == samples && [0.0, 1.0].contains(&value);
         Err(if is_signal {
-            error.help("`index` holds sample positions, one a turn; a marker's signal is named by `marker` in [load]")
+            error.help("`index` has sample positions, one a turn; a marker's signal is named by `marker` in [load]")
         } else {
             error
         })

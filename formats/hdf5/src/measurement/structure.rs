@@ -121,7 +121,7 @@ pub(super) fn remark(input: &InputFile, structures: &Structures, mut data: Vec<R
             let is_structure = bytes.get(..4).is_some_and(|name| name.iter().all(u8::is_ascii_uppercase));
             if !is_structure && bytes.iter().any(|byte| *byte != 0) {
                 return Ok(Some(format!(
-                    "{shown}: {} bytes from byte {at} on hold something and belong to nothing: data were deleted from the file, or it is damaged",
+                    "{shown}: {} bytes from byte {at} on are not 0 and belong to nothing: data were deleted from the file, or it is damaged",
                     taken.start - at
                 )));
             }

@@ -131,7 +131,7 @@ fn every_mistake_is_named_with_its_place() {
         ("A,circle,1,0,1\nB,circle,1,0,1\nA,circle,1,0,1\n", "line 4, column 1 (trace): trace A has ended above"),
         ("A,circle,1,0,1\nA,line,1,0,1\n", "line 3, column 2 (kind): trace A is of kind circle above, not line"),
         ("A,circle,1,0\n", "line: 2"),
-        ("", "it holds no points"),
+        ("", "it has no points"),
     ];
     for (rows, expected) in cases {
         let message = from(&format!("{header}{rows}"), "", &TRACED).unwrap_err().to_string();

@@ -101,7 +101,7 @@ fn large_effects_are_found() {
 
 #[test]
 fn a_list_that_ends_at_its_highest_order_says_so() {
-    let ended = |found: &Diagnosis| found.warnings.iter().any(|warning| warning.contains("the data may hold more"));
+    let ended = |found: &Diagnosis| found.warnings.iter().any(|warning| warning.contains("the data may contain more"));
     let all = |angle: f64| (2..=12).map(|order| (f64::from(order) * (angle - 0.1)).cos()).sum::<f64>();
     let found = diagnosed(|_, angle, _| all(angle));
     assert!(names(&found).contains(&"lobes-8") && ended(&found), "{found:?}");

@@ -206,7 +206,7 @@ pub enum SimulatedEffect {
         #[serde(default)]
         declared: bool,
     },
-    /// A groove along a straight line: a stranger to the closed loop.
+    /// A groove along a straight line: no effect of the closed loop.
     Scratch {
         /// Where it begins, in mm.
         from_mm: [f64; 2],
@@ -217,7 +217,7 @@ pub enum SimulatedEffect {
         /// Its depth, in nm.
         depth_nm: f64,
     },
-    /// A round hole: a stranger to the closed loop.
+    /// A round hole: no effect of the closed loop.
     Pit {
         /// Its middle, in mm.
         at_mm: [f64; 2],

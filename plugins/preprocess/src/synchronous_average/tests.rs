@@ -372,7 +372,7 @@ fn orders_above_half_a_turns_samples_are_not_there() {
         let profile = average(samples_per_rev, input(length)).unwrap();
         assert_eq!((profile.samples_per_rev, profile.max_order()), (samples_per_rev, highest));
         assert_eq!(profile.covariance.as_ref().unwrap().len(), highest + 1);
-        let said = profile.warnings.iter().any(|warning| warning.contains("hold no orders above"));
+        let said = profile.warnings.iter().any(|warning| warning.contains("have no orders above"));
         assert_eq!(said, highest < runout_core::numerics::fourier::max_order(samples_per_rev));
     }
 }

@@ -138,14 +138,14 @@ pub enum SimulatedEffect {
         /// Share of the campaign that is before it.
         at: f64,
     },
-    /// A ball slips on the table: a stranger to the closed loop.
+    /// A ball slips on the table: no effect of the closed loop.
     SlippedBall {
-        /// Row from which it stands elsewhere.
+        /// Row from which it is elsewhere.
         row: usize,
         /// Displacement on the table, in µm.
         by_um: [f64; 3],
     },
-    /// One bad reading: a stranger to the closed loop.
+    /// One bad reading: no effect of the closed loop.
     BadReading {
         /// The row.
         row: usize,

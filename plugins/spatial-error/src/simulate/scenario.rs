@@ -37,10 +37,10 @@ pub struct Scenario {
     pub tool_mm: [f64; 3],
     /// The tracker's noise.
     pub tracker: Tracker,
-    /// How the tracker stood.
+    /// Placement of the tracker.
     #[serde(default)]
     pub placement: Placement,
-    /// What no single axis is to blame for.
+    /// Smooth random error field.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub field: Option<Field>,
     /// Errors of the axes, and what else happens.
@@ -153,7 +153,7 @@ pub enum SimulatedEffect {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         time_constant: Option<f64>,
     },
-    /// A step across a plane: a stranger to the closed loop.
+    /// A step across a plane: no effect of the closed loop.
     Step {
         /// X, Y or Z, across which the plane is.
         axis: String,
@@ -162,7 +162,7 @@ pub enum SimulatedEffect {
         /// By which places above it are displaced, in µm.
         by_um: [f64; 3],
     },
-    /// A box that is displaced: a stranger to the closed loop.
+    /// A box that is displaced: no effect of the closed loop.
     DisplacedBox {
         /// Its lowest corner, in mm.
         from_mm: [f64; 3],
@@ -171,7 +171,7 @@ pub enum SimulatedEffect {
         /// In µm.
         by_um: [f64; 3],
     },
-    /// One bad reading: a stranger to the closed loop.
+    /// One bad reading: no effect of the closed loop.
     BadReading {
         /// The row, from 0.
         row: usize,

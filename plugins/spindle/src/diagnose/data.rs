@@ -91,7 +91,7 @@ impl Shared {
             warnings.push(beside.into());
         }
         if self.data.iter().any(|station| station.held_out.is_none()) {
-            warnings.push("too few turns to hold any out: effects were accepted on the fitted turns alone".into());
+            warnings.push("too few turns for held-out data: effects were accepted on the fitted turns alone".into());
         }
         warnings
     }

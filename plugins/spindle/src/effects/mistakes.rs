@@ -18,7 +18,7 @@ pub enum Mistake {
     SensorOpposite,
     /// Two channels hold each other's signals.
     SensorsSwapped,
-    /// The second of two channels holds the signal of the first.
+    /// The second of two channels has the signal of the first.
     SensorsIdentical,
     /// Two setups hold each other's recordings.
     SetupsSwapped,
@@ -232,7 +232,7 @@ impl Mistake {
         match self {
             Self::SensorsIdentical => {
                 let [first, second] = pair_of(target, rig.sensors.len()).map(|sensor| &rig.sensors[sensor].id);
-                Some(format!("channel `{second}` holds the signal of `{first}`: record it again, or leave it out"))
+                Some(format!("channel `{second}` has the signal of `{first}`: record it again, or leave it out"))
             }
             Self::SetupRepeated => {
                 let [first, second] = pair_of(target, rig.setups.len()).map(|setup| &rig.setups[setup].id);
@@ -285,15 +285,15 @@ impl SpindleEffect for Mistake {
             Self::SensorsSwappedInSetup => "a mistake in the recording: two channels are swapped in one setup",
             Self::RotationReversedInSetup => "a mistake in the recording: the part turns the other way in one setup",
             Self::SensorSign => "a mistake in the rig: a reading has the opposite sign",
-            Self::SensorOpposite => "a mistake in the rig: a sensor stands on the other side of the part",
+            Self::SensorOpposite => "a mistake in the rig: a sensor is on the other side of the part",
             Self::SensorsSwapped => "a mistake in the rig: two channels are swapped",
-            Self::SensorsIdentical => "a mistake in the recording: two channels hold the same signal",
+            Self::SensorsIdentical => "a mistake in the recording: two channels have the same signal",
             Self::SetupsSwapped => "a mistake in the rig: two setups are swapped",
             Self::SetupRepeated => "a mistake in the recording: a setup was recorded twice",
             Self::RotationReversed => "a mistake in the rig: the part turns the other way",
             Self::PartAngleSign => "a mistake in the rig: the part's angles count the other way",
             Self::SensorAnglesSign => "a mistake in the rig: the sensors' angles count the other way",
-            Self::SensorInOtherSection => "a mistake in the rig: a sensor looks at the other section",
+            Self::SensorInOtherSection => "a mistake in the rig: a sensor measures the other section",
             Self::SensorsTurned => {
                 "a mistake in the rig: the sensors stayed or were turned with the part, in one setup"
             }

@@ -1,7 +1,7 @@
 //! What a spindle measurement may have that its rig does not declare: one file an effect.
 //!
 //! An effect says what it is described by, how it changes the model when applied ([`Alterations`]), and how it changes the
-//! readings per unit of each parameter. Readings are u = form + motion along the sensor (`docs/physics.md` section 1).
+//! readings per unit of each parameter. Readings are u = form + motion along the sensor (`docs/appendix/physics.md` section 1).
 //! Partials are those of the averaged readings' harmonics, Re Σ c e^{−inΦ}, at the values that are applied. Parameters are in the units in
 //! which a rig or a scenario is written: angles in degrees, places in mm.
 //!

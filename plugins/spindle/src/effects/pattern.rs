@@ -51,7 +51,7 @@ impl SpindleEffect for OfOrder {
                 ("clamping-form", "the part has another form as it is clamped in one setup", ActsOn::LaterSetup)
             }
             PatternOf::Sensor(_) => {
-                ("electrical-run-out", "a sensor sees a pattern of the part that is no form", ActsOn::Sensor)
+                ("electrical-run-out", "a sensor reads a pattern of the part that is no form", ActsOn::Sensor)
             }
         };
         About { id, does, acts_on, parameters: vec![parameter("cosine", "um", 0.1), parameter("sine", "um", 0.1)] }

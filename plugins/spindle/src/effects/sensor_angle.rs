@@ -25,9 +25,9 @@ impl SpindleEffect for SensorAngle {
         About {
             id: "sensor-angle",
             does: if self.in_one_setup {
-                "a sensor stands at another angle in one setup"
+                "a sensor is at another angle in one setup"
             } else {
-                "a sensor stands at another angle"
+                "a sensor is at another angle"
             },
             acts_on: if self.in_one_setup { ActsOn::SensorInSetup } else { ActsOn::Sensor },
             parameters: vec![parameter("angle", "deg", 1.0)],

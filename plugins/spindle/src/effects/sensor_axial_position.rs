@@ -18,7 +18,7 @@ impl SpindleEffect for SensorAxialPosition {
         let parameters = vec![parameter("shift", "mm", 1.0)];
         About {
             id: "sensor-axial-position",
-            does: "a sensor sits at another place along the axis",
+            does: "a sensor is at another place along the axis",
             acts_on: ActsOn::Sensor,
             parameters,
         }

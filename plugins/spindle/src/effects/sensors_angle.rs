@@ -11,7 +11,7 @@ impl SpindleEffect for SensorsAngle {
     fn about(&self) -> About {
         About {
             id: "sensors-angle",
-            does: "all sensors stood at another angle in one setup",
+            does: "all sensors are at another angle in one setup",
             acts_on: ActsOn::LaterSetup,
             parameters: vec![parameter("angle", "deg", 0.3)],
         }

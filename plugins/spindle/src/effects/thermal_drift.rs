@@ -14,7 +14,7 @@ impl SpindleEffect for ThermalDrift {
         let parameters = vec![parameter("creep", "um/rev", 0.05)];
         About {
             id: "thermal-drift",
-            does: "a sensor's reading creeps over each capture",
+            does: "a sensor's reading drifts over each capture",
             acts_on: ActsOn::Sensor,
             parameters,
         }

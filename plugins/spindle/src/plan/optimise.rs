@@ -54,7 +54,7 @@ pub struct Search {
 pub struct Arrangement {
     /// By sensor, in degrees.
     pub angles_deg: Vec<f64>,
-    /// With every sensor where it should stand.
+    /// With every sensor at its nominal angle.
     pub nominal: Score,
     /// The worst of all placements tried within the angle tolerance.
     pub within_tolerance: Score,

@@ -36,7 +36,7 @@ impl OneDirection {
         let [first, rest @ ..] = &rig.sensors[..] else { return Err("needs a sensor".into()) };
         match rest {
             [second] if second.section == first.section => {
-                let message = "needs one sensor a section; `{a}` and `{b}` look at the same one";
+                let message = "needs one sensor a section; `{a}` and `{b}` measure the same one";
                 return Err(message.replace("{a}", &first.id).replace("{b}", &second.id));
             }
             [second] if !same_angle(second.angle_rad, first.angle_rad) => {

@@ -32,7 +32,7 @@ fn of_face(face: &FaceConfig, rig: &Rig, seed: u64, orders: usize, all: &mut [Ve
     let is_face = |place: &usize| rig.sections[*place] == face.section && rig.is_face(*place);
     let Some(section) = (0..rig.sections.len()).find(is_face) else {
         let ids = (0..rig.sections.len()).filter(|place| rig.is_face(*place)).map(|place| rig.sections[place].as_str());
-        let fault = Fault::at("section", format!("no axial sensor of the rig looks at a face `{}`", face.section));
+        let fault = Fault::at("section", format!("no axial sensor of the rig measures a face `{}`", face.section));
         return Err(fault.help(known_names(&face.section, ids)));
     };
     check::not_negative("rms_um", face.rms_um)?;

@@ -1,7 +1,7 @@
 //! Second-order geometry: a sensor's straight line meets the displaced profile.
 //!
 //! With the part's axis off by (along, t) as the sensor sees it, the line meets the profile of radius ρ = R + h at
-//! α* = α − asin(t/ρ(α*)), at u = along + √(ρ(α*)² − t²) − R (`docs/physics.md` section 1). What exceeds the linear reading
+//! α* = α − asin(t/ρ(α*)), at u = along + √(ρ(α*)² − t²) − R (`docs/appendix/physics.md` section 1). What exceeds the linear reading
 //! along + h(α) is h(α*) − h(α) − t²/(ρ + √(ρ² − t²)), written so that nothing cancels.
 
 #![allow(clippy::inline_always, reason = "see runout_core::numerics::lanes")]

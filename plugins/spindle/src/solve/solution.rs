@@ -116,8 +116,8 @@ impl Solver<'_> {
         // The estimate is good to a size, and stations that are alike are to say the same.
         let times = CARRIED.into_iter().rfind(|times| worst >= *times)?;
         Some(format!(
-            "the surface goes sideways unseen, and an eccentricity of {eccentricity_um:.0} µm carries that into other orders \
-             of form: some may be off by {times} times their stated uncertainty or more, and motion with them; centre the part better"
+            "lateral motion is not observable with these sensors, and an eccentricity of {eccentricity_um:.0} µm couples it into other \
+             orders of form: some may be off by {times} times their stated uncertainty or more, and motion with them; centre the part better"
         ))
     }
 

@@ -14,7 +14,7 @@ use runout_core::{
 use runout_preprocess::{LowPassConfig, SynchronousAverageConfig};
 use runout_spindle::simulate::{self, SpindleConfig};
 
-/// `docs/physics.md` section 4: sensor noise 0.05 µm, asynchronous motion 0.15 µm, form 4 µm, motion 1.5 µm rms, 8 µm off
+/// `docs/appendix/physics.md` section 4: sensor noise 0.05 µm, asynchronous motion 0.15 µm, form 4 µm, motion 1.5 µm rms, 8 µm off
 /// centre.
 pub(crate) fn campaign(seed: u64, effects: &str) -> SpindleConfig {
     let sensor = |id: &str, angle_deg: f64, z_mm: f64, section: &str| SensorConfig {

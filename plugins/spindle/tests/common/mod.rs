@@ -68,7 +68,7 @@ pub(crate) struct Truth {
     pub motion: [Sum; 4],
 }
 
-/// Averaged readings by the linear equation of `docs/physics.md` section 1, sample by sample.
+/// Averaged readings by the linear equation of `docs/appendix/physics.md` section 1, sample by sample.
 pub(crate) fn linear_station(rig: &Rig, truth: &Truth, samples: usize, eccentricity_um: f64) -> Station {
     let profiles = rig.setups.iter().enumerate().map(|(setup, clamping)| {
         let channels: Vec<Vec<f64>> = rig

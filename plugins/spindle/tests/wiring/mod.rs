@@ -284,11 +284,11 @@ fn a_recording_stored_twice_is_said_by_run() {
     station.profiles[2].setup = 2;
     let warnings = warned(&config.rig, &station);
     assert!(
-        warnings.iter().any(|warning| warning.contains("setups `b` and `c` hold the same recording")),
+        warnings.iter().any(|warning| warning.contains("setups `b` and `c` have the same recording")),
         "{warnings:?}"
     );
     let found = looked_into(&config.rig, &station).diagnosis;
-    assert!(found.warnings.iter().any(|warning| warning.contains("hold the same recording")), "{:?}", found.warnings);
+    assert!(found.warnings.iter().any(|warning| warning.contains("have the same recording")), "{:?}", found.warnings);
     assert_eq!(found.added.iter().map(name).collect::<Vec<_>>(), ["setup-repeated b c"]);
 }
 

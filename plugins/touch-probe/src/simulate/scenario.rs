@@ -31,7 +31,7 @@ pub struct TouchProbeScenario {
     pub machine: Machine,
     /// Drift over the whole measurement.
     pub drift: Drift,
-    /// What no model knows.
+    /// Disturbances that no effect models.
     pub strangers: Strangers,
 }
 
@@ -161,7 +161,7 @@ pub struct Drift {
     pub time_constant: f64,
 }
 
-/// What no model knows.
+/// Disturbances that no effect models.
 #[derive(Debug, Clone, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Strangers {

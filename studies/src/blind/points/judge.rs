@@ -175,14 +175,14 @@ impl Judged {
                 failures.push(format!("{} missed", planted.id));
             }
         }
-        let alarm = if self.kind == Kind::Stranger { "blamed" } else { "false alarm" };
+        let alarm = if self.kind == Kind::Stranger { "effect added" } else { "false alarm" };
         failures.extend(self.false_alarms.iter().map(|name| format!("{alarm}: {name}")));
         match self.kind {
             Kind::Stranger if self.is_visible() && !self.is_unexplained() => {
-                failures.push("not said to be unexplained".into());
+                failures.push("not reported as unexplained".into());
             }
             Kind::Stranger => {}
-            _ if self.is_unexplained() => failures.push("something said to be left".into()),
+            _ if self.is_unexplained() => failures.push("something reported as unexplained".into()),
             _ => {}
         }
         let noticed = self.kind != Kind::Stranger && self.is_visible() || self.kind == Kind::Clean;

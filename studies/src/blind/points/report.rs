@@ -77,7 +77,7 @@ fn percent(some: usize, all: usize) -> String {
 
 fn clean(all: &[Judged]) -> String {
     let mut text = String::from(
-        "| clean campaigns | campaigns | with a false alarm | said to leave something |\n| --- | --- | --- | --- |\n",
+        "| clean campaigns | campaigns | with a false alarm | with an unexplained residual |\n| --- | --- | --- | --- |\n",
     );
     let clean = of(all, Kind::Clean);
     let mut count = |name: &str, which: &dyn Fn(&Judged) -> bool| {
@@ -95,8 +95,8 @@ fn clean(all: &[Judged]) -> String {
 
 fn strangers(all: &[Judged]) -> String {
     let mut text = String::from(
-        "| stranger | campaigns | visible | said to be unexplained, none blamed | unexplained, and one blamed | explained away | \
-         visible and not said | below, of these said |\n| --- | --- | --- | --- | --- | --- | --- | --- |\n",
+        "| unmodelled disturbance | campaigns | visible | unexplained, no effect added | unexplained, an effect added | an effect added, not unexplained | \
+         visible and not reported | below, of these reported |\n| --- | --- | --- | --- | --- | --- | --- | --- |\n",
     );
     let strangers = of(all, Kind::Stranger);
     let mut count = |name: &str, which: &dyn Fn(&Judged) -> bool| {

@@ -147,10 +147,10 @@ pub(crate) fn of_recording(sources: &Sources, recording: &Path) -> std::result::
             [_] => set("load.files.0.path", recording),
             _ => {
                 let (problem, help) = if files.is_empty() {
-                    let help = "give the folder that holds them, or name one file by `files` in [load], in whose place a file can be read";
+                    let help = "give the folder that contains them, or name one file by `files` in [load], in whose place a file can be read";
                     ("[load] names its files by `pattern`, which a file cannot replace", help)
                 } else {
-                    ("[load] names several files, which one file cannot replace", "give the folder that holds them")
+                    ("[load] names several files, which one file cannot replace", "give the folder that contains them")
                 };
                 let error = Error::new("load", recording.display().to_string(), problem);
                 return Err(error.of(ErrorKind::Configuration).help(help).into());

@@ -1,5 +1,5 @@
-//! Several separators on the same preprocessed data: values side by side, and their differences with what the scatter
-//! over the turns lets expect of them.
+//! Several separators on the same preprocessed data: values side by side, and their differences beside those
+//! expected from the scatter over the turns.
 //!
 //! Two methods on the same readings u make errors that are not independent. With δa = P_a δu and δb = P_b δu, the
 //! difference of an order has the variance E|δa − δb|² = (P_a − P_b) Σ (P_a − P_b)ᴴ, Σ the covariance of the averaged

@@ -31,7 +31,7 @@ pub(crate) struct DiagnoseConfig {
     pub out: Option<PathBuf>,
     /// Where `diagnosis.json` goes; beside the first export of the final model without it.
     pub path: Option<PathBuf>,
-    /// Memory that the loop may take, in GB: it holds all stations of recorded turns at once, and refuses those that need more.
+    /// Memory that the loop may take, in GB: it keeps all stations of recorded turns at once, and refuses those that need more.
     #[serde(default = "default_memory_gb")]
     pub memory_gb: f64,
 }
@@ -59,7 +59,7 @@ pub(crate) enum Effects {
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub(crate) enum AllEffects {
-    /// Every effect that the toolkit knows.
+    /// Every effect of the toolkit.
     All,
 }
 

@@ -54,7 +54,7 @@ pub fn pipeline_schema(registry: &Registry) -> Value {
         "properties": {
             "title": { "type": "string", "description": "For results and meshes." },
             "rig": {
-                "description": "Sensors and setups, or the path of a file that holds them.",
+                "description": "Sensors and setups, or the path of a file that has them.",
                 "anyOf": [{ "type": "string" }, rig],
             },
             "load": choice(&registry.loaders),

@@ -21,7 +21,7 @@ pub struct Scenario<E> {
     /// How readings follow from form and displacement.
     #[serde(default)]
     pub geometry: Geometry,
-    /// Sensors and setups, as they are believed to be.
+    /// Sensors and setups, as declared.
     pub rig: RigConfig,
     /// Turns, sampling, stations and converter.
     #[serde(default)]
@@ -29,7 +29,7 @@ pub struct Scenario<E> {
     /// The part.
     #[serde(default)]
     pub form: FormConfig,
-    /// Faces that axial sensors look at; those that are not named are flat.
+    /// Faces of the axial sensors; those that are not named are flat.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub face: Vec<FaceConfig>,
     /// The spindle's synchronous error motion.

@@ -67,7 +67,7 @@ impl Acts for SensorsSwapped {
     }
 }
 
-/// The second of two channels holds the signal of the first, each with its own noise.
+/// The second of two channels has the signal of the first, each with its own noise.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SensorsIdentical {

@@ -34,7 +34,7 @@ use super::world::World;
 pub enum Effect {
     /// Readings are too large or too small by a factor.
     SensorGain(SensorGain),
-    /// The sensor looks at the part from another angle.
+    /// The sensor is at another angle.
     SensorAngle(SensorAngle),
     /// The sensor sits at another z: another lever arm on tilt, and another circle of the part.
     SensorAxialPosition(SensorAxialPosition),
@@ -42,7 +42,7 @@ pub enum Effect {
     SensorNonlinearity(SensorNonlinearity),
     /// The part was clamped at another angle.
     ReversalAngle(ReversalAngle),
-    /// All sensors stood at another angle in a setup.
+    /// All sensors are at another angle in a setup.
     SensorsAngle(SensorsAngle),
     /// The part was clamped further off, at a known place.
     PartEccentricity(PartEccentricity),
@@ -54,7 +54,7 @@ pub enum Effect {
     EvenOrderMotion(EvenOrderMotion),
     /// A line in channels that is no motion: electrical pick-up.
     SensorLine(SensorLine),
-    /// The reading creeps from the start of each capture, along a straight line or ever slower.
+    /// The reading drifts from the start of each capture, along a straight line or ever slower.
     ThermalDrift(ThermalDrift),
     /// Motion to and fro at an order that is not whole.
     AsynchronousLine(AsynchronousLine),
@@ -88,13 +88,13 @@ pub enum Effect {
     ChuckForm(ChuckForm),
     /// The part has another form as it is clamped in a setup.
     ClampingForm(ClampingForm),
-    /// A sensor sees a pattern of the part's material that is no form.
+    /// A sensor reads a pattern of the part's material that is no form.
     ElectricalRunOut(ElectricalRunOut),
     /// A mistake in the rig: readings have the opposite sign.
     SensorSign(SensorSign),
     /// A mistake in the rig: two channels are swapped.
     SensorsSwapped(SensorsSwapped),
-    /// A mistake in the recording: a channel holds the signal of another.
+    /// A mistake in the recording: a channel has the signal of another.
     SensorsIdentical(SensorsIdentical),
     /// A mistake in the rig: two setups are swapped.
     SetupsSwapped(SetupsSwapped),
@@ -104,13 +104,13 @@ pub enum Effect {
     RotationReversed(RotationReversed),
     /// A mistake in the rig: the part's angles count the other way.
     PartAngleSign(PartAngleSign),
-    /// A stranger, which the closed loop does not know: a local dent that not every sensor sees, or not in every setup.
+    /// No effect of the closed loop: a local dent that not every sensor reads, or not in every setup.
     Dent(Dent),
-    /// A stranger: play in one channel.
+    /// No effect of the closed loop: play in one channel.
     Backlash(Backlash),
-    /// A stranger: a reading steps over part of the turn.
+    /// No effect of the closed loop: a reading steps over part of the turn.
     Step(Step),
-    /// A stranger: from some turn on a probe sits elsewhere.
+    /// No effect of the closed loop: from some turn on a probe is elsewhere.
     SlippedProbe(SlippedProbe),
 }
 

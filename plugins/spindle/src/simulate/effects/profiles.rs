@@ -37,7 +37,7 @@ impl Acts for ProbeSpot {
 pub struct BracketMotion {
     /// Ids of sensors.
     pub targets: Vec<String>,
-    /// Relative: at 0.02 the sensor sees 98 % of the motion.
+    /// Relative: at 0.02 the sensor reads 98 % of the motion.
     pub share: f64,
     /// Always false: what the separation is to know is declared in the pipeline.
     #[serde(default)]

@@ -39,7 +39,7 @@ impl Acts for Dent {
 
     fn apply(&self, world: &mut World, _index: usize) -> Result<(), Fault> {
         if self.targets.is_empty() && self.setups.is_empty() {
-            return Err(Fault::at("plugin", "a dent that every sensor sees in every setup is form")
+            return Err(Fault::at("plugin", "a dent that every sensor reads in every setup is form")
                 .help("name `targets` or `setups`"));
         }
         check::finite("depth_um", self.depth_um)?;
