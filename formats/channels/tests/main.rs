@@ -5,6 +5,7 @@ mod conformance;
 mod mutations;
 mod real_files;
 mod references;
+mod resampling;
 mod speed;
 mod support;
 mod turns;
