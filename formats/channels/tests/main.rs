@@ -6,6 +6,5 @@ mod mutations;
 mod real_files;
 mod references;
 mod resampling;
-mod speed;
 mod support;
 mod turns;
