@@ -22,6 +22,9 @@ const ROUNDNESS: [[&str; 2]; 6] = [
     ["shapely"; 2],
 ];
 const KRIGING: [[&str; 2]; 4] = [["numpy"; 2], ["scipy"; 2], ["sklearn", "scikit-learn"], ["pykrige"; 2]];
+/// The formats' reference libraries.
+const FORMATS: [&str; 5] =
+    ["npTDMS==1.13.0", "pyuff==2.5.8", "scipy==1.17.1", "soundfile==0.14.0", "surfalize==0.19.2"];
 /// Samples a turn and turns of a section, as in the record that the peers are measured with.
 const SAMPLES_PER_REV: usize = 2560;
 const TURNS: usize = 120;
@@ -190,6 +193,22 @@ pub(crate) fn kriging(words: &[&str]) -> Outcome {
     compare.arg("-B").arg("benchmarks/kriging/compare.py");
     compare.arg(target().join("release/examples/spatial_error_bench")).arg(&peers).arg(target().join("bench"));
     run(compare.args(words))
+}
+
+/// Times reading files beside the formats' reference libraries, one thread; the number of rounds may be given.
+pub(crate) fn formats(words: &[&str]) -> Outcome {
+    let folder = tools().join("formats-venv");
+    setup::python_environment(&folder)?;
+    if answer(folder.join("bin/python"), &["-c", "import nptdms, pyuff, scipy, soundfile, surfalize"]).is_none() {
+        run(Command::new(folder.join("bin/pip")).arg("install").arg("--quiet").args(FORMATS))?;
+    }
+    for (package, example) in [("runout-channels", "channel_seconds"), ("runout-maps", "map_seconds")] {
+        run(&mut cargo(&["build", "--release", "--package", package, "--example", example])?)?;
+    }
+    let mut compare = Command::new(folder.join("bin/python"));
+    compare.env("OMP_NUM_THREADS", "1").env("OPENBLAS_NUM_THREADS", "1").arg("-B").arg("benchmarks/formats/compare.py");
+    compare.args(["channel_seconds", "map_seconds"].map(|example| target().join("release/examples").join(example)));
+    run(compare.arg(target().join("bench/formats")).args(words))
 }
 
 /// The folder of the peers, if it holds these files; says why not.

@@ -65,6 +65,8 @@ cargo xtask COMMAND
                 time predictions from 1000 measured points beside scikit-learn and pykrige, one thread
   bench-batch [SCRATCH] [--recordings N] [--rounds N] [--jobs A,B] [--program FILE]
                 time `runout batch` of 1000 recordings of 2 MB on one job and on two; 2 GB in target/bench/batch
+  bench-formats [ROUNDS]
+                time reading TDMS, MAT, NPY, WAV, UFF, X3P, SDF and SUR beside their reference libraries, one thread
   areal-peers [RINGS POINTS ROUNDS]
                 print areal and profile values of one surface beside surfalize's, with both times
   record-results FOLDER [PROGRAM]
@@ -127,6 +129,7 @@ fn main() -> ExitCode {
         ["bench-stages", ref rest @ ..] => bench::stages(rest),
         ["bench-roundness"] => bench::roundness(),
         ["bench-kriging", ref rest @ ..] => bench::kriging(rest),
+        ["bench-formats", ref rest @ ..] => bench::formats(rest),
         ["studies", ref arguments @ ..] => chores::studies(arguments),
         _ => {
             say(&format!("unknown command `{}`\n\n{HELP}", words.join(" ")));

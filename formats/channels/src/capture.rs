@@ -4,84 +4,27 @@ use std::{path::PathBuf, sync::Arc};
 
 use runout_core::{
     Error, ErrorKind, Result,
-    clock::ClockScan,
     measurement::StationKey,
     rig::{Rig, Unit},
 };
 
 use crate::{
     channel::{Channel, ChannelFile},
+    clock::{Clock, Common, SAME_RATE, Scan, time_beside},
     config::{ChannelConfig, ChannelsConfig},
     files::Files,
-    hints::is_time,
-    select, unit,
+    select,
+    signal::{Conversion, Signal},
+    unit,
 };
-
-/// Sampling rates that differ by a smaller share are the same: rounding of a time column.
-const SAME_RATE: f64 = 1e-3;
-/// Instants that differ by a smaller share of a sample are the same.
-const SAME_INSTANT: f64 = 0.01;
-/// Samples that are read at a time.
-pub(crate) const BLOCK: usize = 1 << 13;
-/// A file and one of its channels.
-#[derive(Clone)]
-pub(crate) struct Signal {
-    pub(crate) file: Arc<dyn ChannelFile>,
-    pub(crate) index: usize,
-    /// For messages: `run.tdms:Run 0/X1`.
-    pub(crate) shown: String,
-}
-
-impl Signal {
-    pub(crate) fn channel(&self) -> &Channel {
-        &self.file.channels()[self.index]
-    }
-
-    pub(crate) fn error(&self, problem: impl std::fmt::Display) -> Error {
-        Error::new("read", &self.shown, problem)
-    }
-
-    /// Passes all samples through once.
-    pub(crate) fn each(&self, mut take: impl FnMut(f64) -> Result<()>) -> Result<()> {
-        let mut samples = self.file.read(&[self.index])?;
-        let mut column = [Vec::new()];
-        while samples.next(BLOCK, &mut column)? > 0 {
-            column[0].drain(..).try_for_each(&mut take)?;
-        }
-        Ok(())
-    }
-
-    /// Lowest and highest of all samples, and whether there are no others.
-    pub(crate) fn range(&self) -> Result<(f64, f64, bool)> {
-        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-        self.each(|value| {
-            (low, high) = (low.min(value), high.max(value));
-            Ok(())
-        })?;
-        let mut has_others = false;
-        self.each(|value| {
-            has_others |= value > low && value < high;
-            Ok(())
-        })?;
-        Ok((low, high, !has_others))
-    }
-}
-
-/// How the numbers of a channel become those of the sensor.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Conversion {
-    pub(crate) gain: f64,
-    pub(crate) offset: f64,
-}
 
 /// The signals of a capture.
 pub(crate) struct Signals {
     /// Of each sensor of the rig.
     pub(crate) sensors: Vec<(Signal, Conversion)>,
-    pub(crate) samples: u64,
-    pub(crate) rate_hz: Option<f64>,
-    /// Time of the first sample, in s.
-    pub(crate) start_s: f64,
+    /// When the samples of each were taken.
+    pub(crate) clocks: Vec<Clock>,
+    pub(crate) common: Common,
     pub(crate) remarks: Vec<String>,
 }
 
@@ -185,18 +128,19 @@ impl Place<'_> {
             let names = without_unit.join(", ");
             remarks.push(format!("{shown}: no unit of {names}: the numbers are taken as the sensors' of the rig"));
         }
-        let rate_hz = self.rate_hz(&sensors)?;
-        let start_s = same_start(&sensors, rate_hz)?;
-        let lengths = || sensors.iter().map(|(signal, _)| signal.channel().samples);
-        let samples = lengths().min().unwrap_or(0);
-        if let Some((longer, _)) = sensors.iter().find(|(signal, _)| signal.channel().samples > samples) {
-            let more = longer.channel().samples - samples;
-            remarks
-                .push(format!("{}: its last {more} samples are not used: another channel ends before", longer.shown));
-        }
+        let signals: Vec<&Signal> = sensors.iter().map(|(signal, _)| signal).collect();
+        let clocks = self.clocks(signals.iter().copied())?;
+        let common = Common::of(&signals, &clocks)?;
+        let samples = common.clock.samples;
         if samples == 0 {
             let shown = sensors.first().map_or_else(String::new, |(signal, _)| signal.shown.clone());
             return Err(Error::new("read", shown, "expected samples, found none").of(ErrorKind::InsufficientData));
+        }
+        let is_longer = |signal: &&&Signal| !common.is_resampled && signal.channel().samples > samples;
+        if let Some(longer) = signals.iter().find(is_longer) {
+            let more = longer.channel().samples - samples;
+            remarks
+                .push(format!("{}: its last {more} samples are not used: another channel ends before", longer.shown));
         }
         for (signal, _) in &sensors {
             for remark in signal.file.remarks() {
@@ -205,7 +149,7 @@ impl Place<'_> {
                 }
             }
         }
-        Ok(Signals { sensors, samples, rate_hz, start_s, remarks })
+        Ok(Signals { sensors, clocks, common, remarks })
     }
 
     /// From the numbers of the file to those of the sensor, and whether a unit says so.
@@ -243,85 +187,70 @@ impl Place<'_> {
         Ok((Conversion { gain: gain * factor, offset: offset * factor }, true))
     }
 
-    /// The rate of the sensors' channels.
-    fn rate_hz(&self, sensors: &[(Signal, Conversion)]) -> Result<Option<f64>> {
-        let Some((first, _)) = sensors.first() else { return Ok(None) };
-        let stated = self.config.sample_rate_hz;
-        for (signal, _) in sensors {
-            if let (Some(one), Some(other)) = (first.channel().rate_hz, signal.channel().rate_hz)
-                && (one / other - 1.0).abs() > SAME_RATE
-            {
-                let problem = format!("its sampling rate is {other} Hz, that of {} {one} Hz", first.shown);
-                let half_hz = 0.5 * one.min(other);
-                return Err(signal.error(problem).help(format!(
-                    "the slower one holds nothing above {half_hz} Hz, where what is separated would be wrong: record all sensors at one rate, \
-                     or bring the faster ones to the lower rate, behind a low-pass"
-                )));
-            }
-        }
-        let found = match first.channel().rate_hz {
-            Some(rate_hz) => Some(rate_hz),
+    /// The clocks of the sensors' channels.
+    ///
+    /// # Errors
+    /// When times are not even, or contradict the configuration.
+    pub(crate) fn clocks<'a>(&self, sensors: impl Iterator<Item = &'a Signal>) -> Result<Vec<Clock>> {
+        // Columns of one table share its times, which are looked through once.
+        let mut scans: Vec<Scan> = Vec::new();
+        let stated_hz = self.config.sample_rate_hz;
+        let mut clocks = Vec::new();
+        for signal in sensors {
             // A time column takes a look at each sample: only where it is named, or nothing else says the rate.
-            None if self.config.time.is_some() || stated.is_none() => self.clock(first)?,
-            None => None,
-        };
-        match (stated, found) {
-            (Some(stated), Some(found)) if (found / stated - 1.0).abs() > SAME_RATE => {
-                let problem = format!("its sampling rate is {found} Hz, that of the configuration {stated} Hz");
-                Err(first.error(problem).help("leave `sample_rate_hz` out of [load], or correct it"))
+            let mut clock = match stated_hz {
+                Some(_) if self.config.time.is_none() => Clock::stated(signal.channel(), 0.0),
+                _ => self.clock(signal, &mut scans)?,
+            };
+            if let (Some(stated_hz), Some(found_hz)) = (stated_hz, clock.rate_hz)
+                && (found_hz / stated_hz - 1.0).abs() > SAME_RATE
+            {
+                let problem = format!("its sampling rate is {found_hz} Hz, that of the configuration {stated_hz} Hz");
+                return Err(signal.error(problem).help("leave `sample_rate_hz` out of [load], or correct it"));
             }
-            (stated, found) => Ok(stated.or(found)),
+            clock.rate_hz = stated_hz.or(clock.rate_hz);
+            clocks.push(clock);
+        }
+        Ok(clocks)
+    }
+
+    /// The clock of a channel by itself or by its channel of times.
+    fn clock(&self, signal: &Signal, scans: &mut Vec<Scan>) -> Result<Clock> {
+        let stated = Clock::stated(signal.channel(), 0.0);
+        if stated.rate_hz.is_some() {
+            return Ok(stated);
+        }
+        let Some(time) = self.times(signal)? else { return Ok(stated) };
+        let known =
+            scans.iter().position(|scan| Arc::ptr_eq(&scan.time.file, &time.file) && scan.time.index == time.index);
+        let place = known.unwrap_or(scans.len());
+        if known.is_none() {
+            scans.push(Scan::of(time)?);
+        }
+        let Scan { rate_hz, start_s, .. } = scans[place];
+        Ok(Clock { rate_hz, start_s: signal.channel().start_s.unwrap_or(start_s), ..stated })
+    }
+
+    /// The clock of a channel of marks or angles: its own, or that of the sensors where it has as many samples.
+    ///
+    /// # Errors
+    /// When its times are not even.
+    pub(crate) fn clock_beside(&self, signal: &Signal, sensors: &Common) -> Result<Clock> {
+        let channel = signal.channel();
+        if channel.rate_hz.is_none() && !sensors.is_resampled && channel.samples == sensors.clock.samples {
+            return Ok(Clock { rate_hz: sensors.clock.rate_hz, ..Clock::stated(channel, sensors.begin_s) });
+        }
+        match channel.rate_hz {
+            Some(_) => Ok(Clock::stated(channel, sensors.begin_s)),
+            None => self.clock(signal, &mut Vec::new()),
         }
     }
 
-    /// The rate by a channel of times beside another one.
-    fn clock(&self, beside: &Signal) -> Result<Option<f64>> {
-        let time = match &self.config.time {
-            Some(name) => Some(self.signal(name)?),
-            None => time_beside(beside),
-        };
-        let Some(time) = time else { return Ok(None) };
-        let factor = match time.channel().unit.as_deref().and_then(unit::known) {
-            Some(unit::Known::Seconds(factor)) => factor,
-            _ => 1.0,
-        };
-        let mut scan = ClockScan::default();
-        let (mut sample, help) = (0_u64, "state `sample_rate_hz` in [load] where the times have too few digits");
-        time.each(|value| {
-            let failed = |problem: String| time.error(format!("sample {sample}: {problem}")).help(help);
-            if !value.is_finite() {
-                return Err(failed(format!("expected a time, found {value}")));
-            }
-            scan.push(value * factor).map_err(failed)?;
-            sample += 1;
-            Ok(())
-        })?;
-        scan.rate_hz().map_err(|problem| time.error(problem).help(help))
-    }
-}
-
-/// A channel of times in the same group, as long as another one.
-fn time_beside(beside: &Signal) -> Option<Signal> {
-    let channels = beside.file.channels();
-    let own = beside.channel();
-    let index = channels
-        .iter()
-        .position(|channel| is_time(channel) && channel.group == own.group && channel.samples == own.samples)?;
-    let shown = beside.shown.replace(&own.path(), &channels[index].path());
-    Some(Signal { file: Arc::clone(&beside.file), index, shown })
-}
-
-/// When the first samples were taken, which has to be at one time.
-fn same_start(sensors: &[(Signal, Conversion)], rate_hz: Option<f64>) -> Result<f64> {
-    let start_s = |signal: &Signal| signal.channel().start_s.unwrap_or(0.0);
-    let Some((first, _)) = sensors.first() else { return Ok(0.0) };
-    let at_s = start_s(first);
-    for (signal, _) in sensors {
-        let off = (start_s(signal) - at_s) * rate_hz.unwrap_or(0.0);
-        if off.abs() > SAME_INSTANT {
-            let problem = format!("its first sample is {off:.3} samples later than that of {}", first.shown);
-            return Err(signal.error(problem).help("record all sensors by one trigger, or shift them before"));
+    /// The channel of times beside another one.
+    fn times(&self, beside: &Signal) -> Result<Option<Signal>> {
+        match &self.config.time {
+            Some(name) => self.signal(name).map(Some),
+            None => Ok(time_beside(beside)),
         }
     }
-    Ok(at_s)
 }

@@ -11,10 +11,10 @@ use runout_core::{Result, input_file::InputFile};
 use serde::Serialize;
 
 use crate::{
-    capture::BLOCK,
     channel::{Channel, ChannelFile, Samples},
     formats,
     hints::is_time,
+    signal::BLOCK,
     unit::{self, Known},
 };
 

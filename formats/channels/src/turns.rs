@@ -9,9 +9,11 @@ use runout_core::{
 };
 
 use crate::{
-    capture::{BLOCK, Place, Signal, Signals},
+    capture::{Place, Signals},
     channel::Samples,
+    clock::Instants,
     config::{AngleConfig, MarkConfig},
+    signal::{BLOCK, Signal},
     unit::{self, Known},
 };
 
@@ -61,34 +63,6 @@ pub(crate) struct AngleSignal {
     scan: EncoderScan,
     /// From samples of the sensors to those of this channel.
     instants: Instants,
-}
-
-/// From the samples of one channel to those of another: position · ratio + shift.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Instants {
-    ratio: f64,
-    shift: f64,
-}
-
-impl Instants {
-    fn of(&self, position: f64) -> f64 {
-        position * self.ratio + self.shift
-    }
-
-    /// From samples of `from` to those of `to`.
-    ///
-    /// # Errors
-    /// What is not known of them.
-    fn between(from: (Option<f64>, f64, u64), to: (Option<f64>, f64, u64)) -> std::result::Result<Self, String> {
-        match (from.0, to.0) {
-            (Some(one), Some(other)) => Ok(Self { ratio: other / one, shift: (from.1 - to.1) * other }),
-            _ if from.2 == to.2 => Ok(Self { ratio: 1.0, shift: 0.0 }),
-            _ => Err(format!(
-                "it has {} samples, the sensors {}, and the sampling rates of both are not known",
-                from.2, to.2
-            )),
-        }
-    }
 }
 
 impl Turns {
@@ -167,7 +141,7 @@ impl Turns {
 
     fn by_times(place: &Place, signals: &Signals, name: &str) -> Result<Self> {
         let signal = place.signal(name)?;
-        let Some(rate_hz) = signals.rate_hz else {
+        let Some(rate_hz) = signals.common.clock.rate_hz else {
             return Err(signal.error("times of marks need the sampling rate").help("state `sample_rate_hz` in [load]"));
         };
         let factor = match signal.channel().unit.as_deref().and_then(unit::known) {
@@ -176,7 +150,7 @@ impl Turns {
         };
         let mut marks: Vec<f64> = Vec::new();
         signal.each(|time| {
-            let position = (time * factor - signals.start_s) * rate_hz;
+            let position = (time * factor - signals.common.clock.start_s) * rate_hz;
             match marks.last() {
                 Some(last) if position.partial_cmp(last) != Some(Ordering::Greater) => {
                     Err(signal.error(format!("mark {}: expected a time above that before, found {time}", marks.len())))
@@ -203,10 +177,8 @@ impl Turns {
             },
             _ => place.config.pulses_per_turn.map_or(1.0, |count| 360.0 / f64::from(count)),
         };
-        let channel = signal.channel();
-        let rate_hz = channel.rate_hz.or_else(|| signals.rate_hz.filter(|_| channel.samples == signals.samples));
-        let to = (rate_hz, channel.start_s.unwrap_or(signals.start_s), channel.samples);
-        let instants = Instants::between((signals.rate_hz, signals.start_s, signals.samples), to);
+        let to = place.clock_beside(&signal, &signals.common)?;
+        let instants = Instants::between(signals.common.clock, to);
         let instants = instants.map_err(|problem| signal.error(problem))?;
         let (low, high, _) = signal.range()?;
         // What stays within one turn begins anew with each.
@@ -215,7 +187,7 @@ impl Turns {
         let mut found = AngleSignal { signal, degrees, period_deg, scan: EncoderScan::default(), instants };
         let mut scan = EncoderScan::default();
         let mut reader = found.reader()?;
-        for sample in 0..signals.samples {
+        for sample in 0..signals.common.clock.samples {
             let angle_deg = reader.at(sample)?;
             scan.push(angle_deg).map_err(|fault| {
                 let error = found.signal.error(format!("sample {}: {fault}", fault.sample));
@@ -328,10 +300,7 @@ fn at(pulses: &[f64], pulse: f64) -> f64 {
 /// Marks in the samples of the sensors, and within how many samples they lie.
 fn crossings(place: &Place, signals: &Signals, mark: &MarkConfig) -> Result<(Vec<f64>, f64)> {
     let signal = place.signal(&mark.channel)?;
-    let channel = signal.channel();
-    let rate_hz = channel.rate_hz.or_else(|| signals.rate_hz.filter(|_| channel.samples == signals.samples));
-    let from = (rate_hz, channel.start_s.unwrap_or(signals.start_s), channel.samples);
-    let instants = Instants::between(from, (signals.rate_hz, signals.start_s, signals.samples));
+    let instants = Instants::between(place.clock_beside(&signal, &signals.common)?, signals.common.clock);
     let instants = instants.map_err(|problem| signal.error(problem))?;
     let (low, high, is_digital) = signal.range()?;
     let marker = Marker {
@@ -356,11 +325,14 @@ fn crossings(place: &Place, signals: &Signals, mark: &MarkConfig) -> Result<(Vec
 
 /// Marks among the samples.
 fn kept(mut marks: Vec<f64>, signals: &Signals, name: &str) -> Result<Vec<f64>> {
-    let range = -1.0..=signals.samples as f64;
+    let range = -1.0..=signals.common.clock.samples as f64;
     marks.retain(|mark| range.contains(mark));
     if marks.len() < 2 {
-        let problem =
-            format!("expected a mark each turn during its {} samples, found {}", signals.samples, marks.len());
+        let problem = format!(
+            "expected a mark each turn during its {} samples, found {}",
+            signals.common.clock.samples,
+            marks.len()
+        );
         return Err(Error::new("read", name, problem));
     }
     Ok(marks)

@@ -5,6 +5,6 @@ mod conformance;
 mod mutations;
 mod real_files;
 mod references;
-mod speed;
+mod resampling;
 mod support;
 mod turns;

@@ -8,7 +8,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use runout_channels::{ChannelsConfig, FORMATS, MarkConfig, Suggestion, format_of, inspect};
+use runout_channels::{ChannelFile, ChannelsConfig, FORMATS, MarkConfig, Suggestion, format_of, inspect};
 use runout_core::{
     input_file::InputFile,
     measurement::Block,
@@ -34,15 +34,26 @@ const SENSORS: usize = 4;
 /// One file at a time: the memory is that of the process.
 static ALONE: Mutex<()> = Mutex::new(());
 
+/// What a file took.
+#[derive(Debug, Default)]
+pub(crate) struct Taken {
+    is_read: bool,
+    time: Duration,
+    /// Memory beyond what the process had.
+    kb: u64,
+}
+
 /// Opens a file and reads from each of its channels, within bounds of time and memory.
-pub(crate) fn check(path: &Path, bytes: usize) {
+pub(crate) fn check(path: &Path, bytes: usize) -> Taken {
     let _alone = ALONE.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
     let (begun, before_kb) = (Instant::now(), memory_kb("VmRSS:"));
     if memory_kb("VmHWM:") > before_kb + ALLOWANCE_KB / 4 {
         // Linux forgets the largest memory so far.
         let _ = fs::write("/proc/self/clear_refs", "5");
     }
-    if let Ok(file) = opened(path) {
+    let file = opened(path);
+    let is_read = file.is_ok();
+    if let Ok(file) = file {
         for index in 0..file.channels().len().min(64) {
             let mut column = [Vec::new()];
             let Ok(mut reader) = file.read(&[index]) else { continue };
@@ -57,9 +68,11 @@ pub(crate) fn check(path: &Path, bytes: usize) {
         record(path, report.suggestion);
     }
     let taken_kb = memory_kb("VmHWM:").saturating_sub(before_kb);
-    assert!(begun.elapsed() < LONGEST, "{}: {:?}", path.display(), begun.elapsed());
+    let time = begun.elapsed();
+    assert!(time < LONGEST, "{}: {time:?}", path.display());
     let most_kb = ALLOWANCE_KB + 4 * bytes as u64 / 1000;
     assert!(taken_kb < most_kb, "{}: {taken_kb} kB of memory for {bytes} bytes", path.display());
+    Taken { is_read, time, kb: taken_kb }
 }
 
 /// Opens the recording that is suggested for a file, and reads from its setups.
@@ -150,7 +163,8 @@ impl Random {
     }
 }
 
-/// So many files of a format, made of its assets in turns. `RUNOUT_SEED` makes others.
+/// So many files of a format, made of its assets in turns, and what they took. `RUNOUT_SEED` makes others.
+#[allow(clippy::print_stderr, reason = "it measures")]
 fn mutate(format: &str, files: usize) {
     let seed: u64 = std::env::var("RUNOUT_SEED").ok().and_then(|seed| seed.parse().ok()).unwrap_or(1);
     let is_of_it = |path: &PathBuf| format_of(&InputFile::new(path).unwrap(), None).unwrap().name == format;
@@ -159,11 +173,46 @@ fn mutate(format: &str, files: usize) {
     let assets: Vec<(PathBuf, Vec<u8>)> =
         assets.map(|path| (folder.path().join(path.file_name().unwrap()), fs::read(path).unwrap())).collect();
     let mut random = Random(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1);
+    let (mut read, mut longest, mut most_kb) = (0, Duration::ZERO, 0);
     for (place, bytes) in assets.iter().cycle().take(files) {
         let bytes = random.mutated(bytes);
         fs::write(place, &bytes).unwrap();
-        check(place, bytes.len());
+        let taken = check(place, bytes.len());
+        read += usize::from(taken.is_read);
+        (longest, most_kb) = (longest.max(taken.time), most_kb.max(taken.kb));
     }
+    let size_kb = assets.iter().map(|(_, bytes)| bytes.len()).max().unwrap_or(0) / 1000;
+    eprintln!(
+        "| {format} | {files} | {read} | {} | {:.3} s | {most_kb} kB | {size_kb} kB |",
+        files - read,
+        longest.as_secs_f64()
+    );
+}
+
+/// The reference to a text of variable length in HDF5 states its length, which the library takes memory for before it looks at the text.
+#[test]
+fn a_text_that_is_said_to_be_longer_than_its_file_is_left_out_at_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("long.h5");
+    let whole = fs::read(crate::support::assets().join("datasets.h5")).unwrap();
+    let texts = |bytes: &[u8]| {
+        fs::write(&path, bytes).unwrap();
+        let units = |file: &dyn ChannelFile| file.channels().iter().filter(|channel| channel.unit.is_some()).count();
+        opened(&path).ok().map(|file| units(&*file))
+    };
+    let all = texts(&whole).unwrap();
+    let heap = whole.windows(4).position(|bytes| bytes == b"GCOL").unwrap() as u64;
+    let references = (4..whole.len() - 12).filter(|at| whole[*at..*at + 8] == heap.to_le_bytes());
+    let mut lost = 0;
+    for at in references {
+        let mut bytes = whole.clone();
+        bytes[at - 1] = 0x7f;
+        let taken = check(&path, bytes.len());
+        lost += usize::from(texts(&bytes).is_some_and(|found| found < all));
+        // 2 GB are cleared in more than this.
+        assert!(taken.time < Duration::from_millis(300), "at {at}: {:?}", taken.time);
+    }
+    assert!(lost > 0, "no reference was found");
 }
 
 #[test]

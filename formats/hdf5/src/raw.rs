@@ -2,27 +2,33 @@
 #![allow(unsafe_code, reason = "calls of a C library")]
 
 use std::{
-    ffi::{CString, c_char},
+    ffi::{CString, c_char, c_int, c_void},
     ops::Range,
     sync::Once,
 };
 
-use hdf5_metno::{Dataset, Datatype, Group, plist::DatasetCreate, sync::sync};
+use hdf5_metno::{Container, Dataset, Datatype, Group, plist::DatasetCreate, sync::sync, types::VarLenUnicode};
 use hdf5_metno_sys::{
     h5::hsize_t,
+    h5a::H5Aread,
     h5d::H5Dread,
+    h5i::{H5I_type_t, H5Iget_type, hid_t},
     h5l::H5Lget_val,
     h5p::{H5P_DEFAULT, H5Pget_virtual_count, H5Pget_virtual_dsetname, H5Pget_virtual_filename},
     h5pl::H5PLset_loading_state,
-    h5s::{H5S_seloper_t, H5Sclose, H5Screate_simple, H5Sselect_hyperslab},
+    h5s::{H5S_ALL, H5S_seloper_t, H5Sclose, H5Screate_simple, H5Sselect_hyperslab},
     h5t::{
         H5T_IEEE_F32BE, H5T_IEEE_F32LE, H5T_IEEE_F64BE, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, H5T_STD_I8BE, H5T_STD_I8LE,
         H5T_STD_I16BE, H5T_STD_I16LE, H5T_STD_I32BE, H5T_STD_I32LE, H5T_STD_I64BE, H5T_STD_I64LE, H5T_STD_U8BE,
         H5T_STD_U8LE, H5T_STD_U16BE, H5T_STD_U16LE, H5T_STD_U32BE, H5T_STD_U32LE, H5T_STD_U64BE, H5T_STD_U64LE,
-        H5T_class_t, H5Tclose, H5Tcreate, H5Tequal, H5Tinsert,
+        H5T_bkg_t, H5T_cdata_t, H5T_class_t, H5T_cmd_t, H5T_pers_t, H5Tclose, H5Tcreate, H5Tequal, H5Tget_size,
+        H5Tinsert, H5Tregister,
     },
 };
 
+/// Bytes of a reference to a text of variable length as a file holds it: its length in 4 bytes, the address of its heap in 8, its number there in 4
+/// (HDF5 File Format Specification 3.0, IV.B).
+const REFERENCE: usize = 16;
 /// Bytes of a link's value: names of files and paths are shorter.
 const LONGEST_VALUE: usize = 8192;
 
@@ -128,4 +134,54 @@ pub(crate) fn read_field(dataset: &Dataset, field: &str, range: Range<usize>) ->
         status
     });
     (status >= 0).then_some(values)
+}
+
+/// The longest length that the references of an attribute or a dataset to texts of variable length state, in bytes; `None` where they cannot be read.
+///
+/// To read the texts, the library takes memory of that length, and clears it, before it looks at the texts.
+pub(crate) fn longest_text(container: &Container) -> Option<u32> {
+    static ONCE: Once = Once::new();
+    let source = Datatype::from_type::<VarLenUnicode>().ok()?;
+    let mut references = vec![0_u8; container.size().checked_mul(REFERENCE)?];
+    // SAFETY: the types are made here or live as long as `source`; the buffer has as many elements of the type in memory as the container. The
+    // conversion that is registered leaves the bytes as the file holds them, and agrees to nothing but elements of this size. Everything is done under the
+    // library's lock, and closed before it ends.
+    let status = sync(|| unsafe {
+        let memory = H5Tcreate(H5T_class_t::H5T_OPAQUE, REFERENCE);
+        ONCE.call_once(|| {
+            let soft = H5T_pers_t::H5T_PERS_SOFT;
+            H5Tregister(soft, c"references".as_ptr(), source.id(), memory, Some(as_stored));
+        });
+        let to = references.as_mut_ptr().cast();
+        let status = match H5Iget_type(container.id()) {
+            H5I_type_t::H5I_ATTR => H5Aread(container.id(), memory, to),
+            _ => H5Dread(container.id(), memory, H5S_ALL, H5S_ALL, H5P_DEFAULT, to),
+        };
+        H5Tclose(memory);
+        status
+    });
+    let length = |reference: &[u8]| reference.first_chunk().map(|length| u32::from_le_bytes(*length));
+    (status >= 0).then(|| references.chunks_exact(REFERENCE).filter_map(length).max().unwrap_or(0))
+}
+
+/// A conversion that leaves references as the file holds them (HDF5 reference, H5Tregister).
+extern "C" fn as_stored(
+    source: hid_t,
+    target: hid_t,
+    data: *mut H5T_cdata_t,
+    _count: usize,
+    _stride: usize,
+    _other_stride: usize,
+    _elements: *mut c_void,
+    _others: *mut c_void,
+    _settings: hid_t,
+) -> c_int {
+    // SAFETY: the library calls it with its lock taken, with types that live, and with a record that is its own.
+    unsafe {
+        if (*data).command == H5T_cmd_t::H5T_CONV_INIT {
+            (*data).need_bkg = H5T_bkg_t::H5T_BKG_NO;
+            return if H5Tget_size(source) == REFERENCE && H5Tget_size(target) == REFERENCE { 0 } else { -1 };
+        }
+    }
+    0
 }

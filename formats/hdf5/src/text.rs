@@ -5,7 +5,7 @@ use hdf5_metno::{
     types::{FixedAscii, FixedUnicode, IntSize, Reference, TypeDescriptor, VarLenAscii, VarLenUnicode},
 };
 
-use crate::type_name::type_name;
+use crate::{raw, type_name::type_name};
 
 /// Characters of a text of fixed length.
 const LONGEST_FIXED: usize = 1024;
@@ -18,8 +18,14 @@ const MOST_CHARACTERS: usize = 1 << 16;
 pub(crate) fn texts(container: &Container, file: &Location) -> Result<Vec<String>, String> {
     let found = container.dtype().and_then(|dtype| dtype.to_descriptor()).map_err(|error| error.to_string())?;
     let all: Result<Vec<String>, String> = match &found {
-        TypeDescriptor::VarLenUnicode => each(container, |text: &VarLenUnicode| utf8(text.as_bytes())),
-        TypeDescriptor::VarLenAscii => each(container, |text: &VarLenAscii| Ok(any(text.as_bytes()))),
+        TypeDescriptor::VarLenUnicode => {
+            no_longer_than_the_file(container)?;
+            each(container, |text: &VarLenUnicode| utf8(text.as_bytes()))
+        }
+        TypeDescriptor::VarLenAscii => {
+            no_longer_than_the_file(container)?;
+            each(container, |text: &VarLenAscii| Ok(any(text.as_bytes())))
+        }
         TypeDescriptor::FixedUnicode(size) if *size <= LONGEST_FIXED => {
             each(container, |text: &FixedUnicode<LONGEST_FIXED>| utf8(text.as_bytes()))
         }
@@ -32,6 +38,23 @@ pub(crate) fn texts(container: &Container, file: &Location) -> Result<Vec<String
     };
     let padding = |character: char| character == '\0' || character.is_whitespace();
     Ok(all?.into_iter().map(|text| text.trim_matches(padding).to_owned()).collect())
+}
+
+/// Texts of variable length of an attribute or a dataset.
+pub(crate) fn variable(container: &Container) -> Result<Vec<VarLenUnicode>, String> {
+    no_longer_than_the_file(container)?;
+    container.read_raw().map_err(|error| error.to_string())
+}
+
+/// Refuses texts of variable length that are said to be longer than the file.
+fn no_longer_than_the_file(container: &Container) -> Result<(), String> {
+    let bytes = container.file().map_err(|error| error.to_string())?.size();
+    match raw::longest_text(container) {
+        Some(length) if u64::from(length) > bytes => {
+            Err(format!("a text is said to have {length} bytes, the file has {bytes}: it is damaged"))
+        }
+        _ => Ok(()),
+    }
 }
 
 fn each<T: H5Type>(container: &Container, text: impl Fn(&T) -> Result<String, String>) -> Result<Vec<String>, String> {

@@ -146,50 +146,69 @@ fn peak() -> u64 {
     line.and_then(|line| line.trim().trim_end_matches("kB").trim().parse::<u64>().ok()).unwrap_or_default() * 1024
 }
 
-/// Changes bytes, cuts, repeats and overwrites lengths of every file: each is read or refused, in time and in memory.
-#[test]
-fn damaged_files_are_read_or_refused() {
+/// Changes bytes, cuts, repeats and overwrites lengths of every file of a format: each is read or refused, in time and in memory.
+/// `RUNOUT_SEED` makes others.
+#[allow(clippy::print_stderr, reason = "it measures")]
+fn mutate(format: &str, ends: &[&str], count: usize) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("damaged");
-    let before = peak();
-    let mut state = 46_u64;
+    let seed: u64 = std::env::var("RUNOUT_SEED").ok().and_then(|seed| seed.parse().ok()).unwrap_or(46);
+    let mut state = seed;
     let mut random = |below: usize| {
         state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (state >> 33) as usize % below.max(1)
     };
-    let rounds = std::env::var("RUNOUT_MUTATIONS").ok().and_then(|text| text.parse().ok()).unwrap_or(100);
-    let (mut refused, mut all, mut largest) = (0_usize, 0_usize, 0);
     let mut files: Vec<PathBuf> = fs::read_dir(data()).unwrap().map(|entry| entry.unwrap().path()).collect();
-    files.retain(|file| !file.ends_with("expected.json"));
+    files.retain(|file| file.extension().is_some_and(|end| ends.iter().any(|known| end == *known)));
     files.sort();
-    for file in files {
-        let whole = fs::read(&file).unwrap();
-        for round in 0..rounds {
-            let mut content = whole.clone();
-            match round % 4 {
-                0 => content.truncate(random(whole.len())),
-                1 => (0..=random(4)).for_each(|_| content[random(whole.len())] = random(256) as u8),
-                2 => {
-                    let place = random(whole.len().saturating_sub(8));
-                    content[place..place + 4].copy_from_slice(&[0xff, 0xff, 0xff, 0x7f]);
-                }
-                _ => {
-                    let (from, to) = (random(whole.len()), random(whole.len()));
-                    let part = whole[from.min(to)..from.max(to)].to_vec();
-                    content.splice(from..from, part);
-                }
+    let wholes: Vec<Vec<u8>> = files.iter().map(|file| fs::read(file).unwrap()).collect();
+    let (mut read, mut longest, mut most) = (0, Duration::ZERO, 0);
+    for (number, whole) in wholes.iter().cycle().take(count).enumerate() {
+        let mut content = whole.clone();
+        match number / wholes.len() % 4 {
+            0 => content.truncate(random(whole.len())),
+            1 => (0..=random(4)).for_each(|_| content[random(whole.len())] = random(256) as u8),
+            2 => {
+                let place = random(whole.len().saturating_sub(8));
+                content[place..place + 4].copy_from_slice(&[0xff, 0xff, 0xff, 0x7f]);
             }
-            fs::write(&path, &content).unwrap();
-            let start = Instant::now();
-            let found = read(&path, &Wanted { unit: Some("um".into()), ..Wanted::default() });
-            assert!(start.elapsed() < Duration::from_secs(5), "{} round {round}", file.display());
-            (all, refused, largest) =
-                (all + 1, refused + usize::from(found.is_err()), largest.max(content.len() as u64));
+            _ => {
+                let (from, to) = (random(whole.len()), random(whole.len()));
+                let part = whole[from.min(to)..from.max(to)].to_vec();
+                content.splice(from..from, part);
+            }
         }
+        fs::write(&path, &content).unwrap();
+        // Linux forgets the largest memory so far.
+        let _ = fs::write("/proc/self/clear_refs", "5");
+        let (before, start) = (peak(), Instant::now());
+        let found = runout_maps::read(&path, &Wanted { unit: Some("um".into()), ..Wanted::default() });
+        let (time, grown) = (start.elapsed(), peak().saturating_sub(before));
+        let name = files[number % files.len()].display();
+        assert!(time < Duration::from_secs(5), "{name}, file {number}: {time:?}");
+        assert!(grown < 4 * content.len() as u64 + 100_000_000, "{name}, file {number}: {grown} bytes of memory");
+        read += usize::from(found.is_ok());
+        (longest, most) = (longest.max(time), most.max(grown));
     }
-    assert!(refused > all / 4, "{refused} of {all}");
-    let grown = peak() - before;
-    assert!(grown < 4 * largest + 100_000_000, "{grown} bytes");
+    let size = wholes.iter().map(Vec::len).max().unwrap_or(0);
+    let (refused, seconds) = (count - read, longest.as_secs_f64());
+    eprintln!("| {format} | {count} | {read} | {refused} | {seconds:.3} s | {} kB | {} kB |", most / 1000, size / 1000);
+    assert!(refused > count / 8, "{format}: {refused} of {count}");
+}
+
+const FORMATS: [(&str, &[&str]); 4] =
+    [("x3p", &["x3p"]), ("sdf", &["sdf"]), ("sur", &["sur"]), ("text", &["xyz", "asc", "txt"])];
+
+#[test]
+fn damaged_files_are_read_or_refused() {
+    FORMATS.iter().for_each(|(format, ends)| mutate(format, ends, 1000));
+}
+
+/// `cargo nextest run -p runout-maps --run-ignored only --no-capture many`
+#[test]
+#[ignore = "takes a minute"]
+fn many_damaged_files_are_read_or_refused() {
+    FORMATS.iter().for_each(|(format, ends)| mutate(format, ends, 10_000));
 }
 
 /// A header that declares 10 GB is refused by what the file has.

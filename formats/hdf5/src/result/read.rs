@@ -20,7 +20,7 @@ use super::{SURFACE, table::LONG};
 use crate::{
     RESULT_FORMAT,
     node::{self, Place},
-    utf8_path,
+    text, utf8_path,
 };
 
 /// Rows of a table, or points of a surface, that fit in memory.
@@ -95,8 +95,9 @@ pub(super) fn figures(tables: &[TableSpec]) -> hdf5_metno::Result<String> {
 /// A text that is JSON.
 fn document<T: DeserializeOwned>(file: &File, place: &Place, name: &str) -> Result<T> {
     let (dataset, place) = node::dataset(file, place, name)?;
-    let text = dataset.read_scalar::<VarLenUnicode>().map_err(|error| place.error(error))?;
-    serde_json::from_str(&text).map_err(|error| {
+    let texts = text::variable(&dataset).map_err(|problem| place.error(problem))?;
+    let [text] = &texts[..] else { return Err(place.error(format!("expected one text, found {}", texts.len()))) };
+    serde_json::from_str(text).map_err(|error| {
         place
             .error(error)
             .help("the file is of another version of runout: repeat the run, or use the version that wrote it")
@@ -145,7 +146,7 @@ fn column_values(dataset: &Dataset, place: &Place) -> Result<(ArrayRef, bool)> {
             Ok((texts(names.iter().map(FixedUnicode::as_str)), false))
         }
         TypeDescriptor::VarLenUnicode => {
-            let names = dataset.read_raw::<VarLenUnicode>().map_err(failure)?;
+            let names = text::variable(dataset).map_err(|problem| place.error(problem))?;
             Ok((texts(names.iter().map(VarLenUnicode::as_str)), false))
         }
         kind if node::is_number(&kind) => Ok((numbers(dataset.read_raw::<f64>().map_err(failure)?), true)),
