@@ -4,6 +4,7 @@
 
 use runout_core::{
     Result,
+    consistency::Check,
     model::{
         Effect,
         closed_loop::Settings,
@@ -67,7 +68,10 @@ impl PointModel for SpatialError {
         let given = self.given(&campaign, &before);
         let mut tracing =
             Tracing::new(&campaign, declared.clone(), candidates, &jumps, &families, given.as_ref(), allowed);
-        let found = tracing.run(settings.max_added.min(MOST_ADDED)).unwrap_or_default();
+        // Readings at wrong places show effects that are not there.
+        let is_sound = !campaign.checks.iter().any(Check::bars_verdict);
+        let most = if is_sound { settings.max_added.min(MOST_ADDED) } else { 0 };
+        let found = tracing.run(most).unwrap_or_default();
         let Tracing { doubts, mut candidates, .. } = tracing;
         let (added, strangers): (Vec<Found>, Vec<Found>) = found.into_iter().partition(Found::is_added);
         let mut chosen: Vec<Candidate> = added.iter().map(|found| candidates[found.members[0]].clone()).collect();

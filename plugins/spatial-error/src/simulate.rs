@@ -80,7 +80,22 @@ impl Scenario {
                 made.repeat.push((pass + 1) as f64);
             }
         }
+        self.swap(&mut made.readings_um);
         made
+    }
+
+    /// Exchanges readings of passes, which have equal lengths.
+    fn swap(&self, readings_um: &mut [[f64; 3]]) {
+        let length = readings_um.len() / self.passes.max(1);
+        for effect in &self.effect {
+            let SimulatedEffect::PassSwapped { passes: [one, other] } = effect else { continue };
+            let first = |pass: &usize| pass.saturating_sub(1).min(self.passes - 1) * length;
+            if one == other {
+                readings_um[first(one)..first(one) + length].reverse();
+            } else {
+                (0..length).for_each(|row| readings_um.swap(first(one) + row, first(other) + row));
+            }
+        }
     }
 
     /// Places of a pass, in the order of measurement.

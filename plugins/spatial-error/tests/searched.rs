@@ -137,3 +137,15 @@ fn a_step_of_the_tracker_is_no_error_of_the_machine() {
     let found = diagnose(&Scenario { effect: vec![step], ..scenario(74) }, "");
     assert!(!found.added.iter().any(|added| added.effect == "tracker-step"), "{:?}", found.added);
 }
+
+#[test]
+fn passes_that_are_exchanged_in_the_file_are_named() {
+    for (passes, said) in [([1, 2], "pass 1 and pass 2 are exchanged"), ([2, 2], "pass 2 are in reverse order")] {
+        let found = diagnose(
+            &Scenario { effect: vec![SimulatedEffect::PassSwapped { passes }], ..scenario(81) },
+            "std_um = 0.9",
+        );
+        assert_eq!(found.verdict, Verdict::Unexplained, "{:?}", found.added);
+        assert!(found.unexplained.iter().any(|one| one.place.contains(said)), "{:?}", found.unexplained);
+    }
+}

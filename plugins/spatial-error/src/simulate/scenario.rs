@@ -172,6 +172,11 @@ pub enum SimulatedEffect {
         /// By which later readings are displaced, in µm.
         by_um: [f64; 3],
     },
+    /// The readings of two passes are exchanged in the file, row by row; of one, given twice, they are in reverse order: a mistake of the file.
+    PassSwapped {
+        /// Numbers of the passes, from 1.
+        passes: [usize; 2],
+    },
     /// A step across a plane: a stranger to the closed loop.
     Step {
         /// X, Y or Z, across which the plane is.
@@ -306,7 +311,10 @@ impl SimulatedEffect {
             }
             Self::ThermalDrift { targets, .. } => ("targets", &targets[0], &["x", "y", "z"]),
             Self::Step { axis, .. } => ("axis", axis, &["X", "Y", "Z"]),
-            Self::TrackerStep { .. } | Self::DisplacedBox { .. } | Self::BadReading { .. } => return Ok(()),
+            Self::TrackerStep { .. }
+            | Self::PassSwapped { .. }
+            | Self::DisplacedBox { .. }
+            | Self::BadReading { .. } => return Ok(()),
         };
         if known.contains(&target) {
             return Ok(());
