@@ -222,6 +222,9 @@ impl Cut {
             pass: Vec::with_capacity(heights.len()),
             beside_mm: Vec::with_capacity(heights.len()),
         };
+        if heights.len() == 0 {
+            return surface;
+        }
         let rows = || heights.rows.iter().filter(|row| !row.points.is_empty());
         let ends = rows().map(|row| self.ends(heights, row, phase_mm));
         let whole =
