@@ -3,6 +3,7 @@
 mod areal;
 mod bench;
 mod bench_batch;
+mod bench_diagnose;
 mod chores;
 #[cfg(any(test, feature = "data"))]
 mod data;
@@ -11,6 +12,7 @@ mod fuzz;
 mod gallery;
 mod house;
 mod kill_test;
+mod measured;
 mod process;
 mod python;
 mod random;
@@ -67,6 +69,8 @@ cargo xtask COMMAND
                 time `runout batch` of 1000 recordings of 2 MB on one job and on two; 2 GB in target/bench/batch
   bench-formats [ROUNDS]
                 time reading TDMS, MAT, NPY, WAV, UFF, X3P, SDF and SUR beside their reference libraries, one thread
+  bench-diagnose [PROGRAM]
+                time `runout diagnose` of a height map of 1000 x 1000 and of 300 spindle stations, and print its memory
   areal-peers [RINGS POINTS ROUNDS]
                 print areal and profile values of one surface beside surfalize's, with both times
   record-results FOLDER [PROGRAM]
@@ -126,6 +130,7 @@ fn main() -> ExitCode {
         ["bench-campaign", ref rest @ ..] => bench::campaign(rest),
         ["bench-peers", ref rest @ ..] => bench::all_peers(rest),
         ["bench-batch", ref rest @ ..] => bench_batch::batch(rest),
+        ["bench-diagnose", ref rest @ ..] => bench_diagnose::diagnose(rest),
         ["bench-stages", ref rest @ ..] => bench::stages(rest),
         ["bench-roundness"] => bench::roundness(),
         ["bench-kriging", ref rest @ ..] => bench::kriging(rest),

@@ -41,14 +41,6 @@ pub struct Dispersion {
 }
 
 impl Errors<'_> {
-    /// V·columns.
-    fn times(&self, columns: &DMatrix<f64>) -> DMatrix<f64> {
-        match self {
-            Self::White { variance, .. } => columns * *variance,
-            Self::Correlated(errors) => errors.times(columns),
-        }
-    }
-
     /// aᵀ·V·a.
     #[must_use]
     pub fn variance_of(&self, weights: &[f64]) -> f64 {
@@ -103,22 +95,50 @@ struct Sums {
 impl Sums {
     fn of(weights: &[Vec<f64>], basis: &[Vec<f64>], residual: &[f64], members: &[&Vec<usize>], errors: Errors) -> Self {
         let (readings, values) = (residual.len(), weights.len());
-        let mut split = DMatrix::zeros(readings, members.len() * values);
-        for (block, readings) in members.iter().enumerate() {
-            for (value, weights) in weights.iter().enumerate() {
-                for reading in *readings {
-                    split[(*reading, block * values + value)] = weights[*reading];
+        let count = members.len() * values;
+        // Column `block · values + value` of W holds the weights of one value at the readings of one block.
+        let entries = |column: usize| {
+            let weights = &weights[column % values];
+            members[column / values].iter().map(move |reading| (*reading, weights[*reading]))
+        };
+        let along =
+            |column: usize, of: &[f64]| entries(column).map(|(reading, weight)| weight * of[reading]).sum::<f64>();
+        let sums = (0..count).map(|column| along(column, residual)).collect();
+        let covariance = match errors {
+            // WᵀMMW is WᵀW, of which different blocks have nothing, less the part in the span of the basis.
+            Errors::White { variance, .. } => {
+                let inside = DMatrix::from_fn(basis.len(), count, |row, column| along(column, &basis[row]));
+                let mut covariance = -inside.transpose() * inside;
+                for block in 0..members.len() {
+                    for (one, weights) in weights.iter().enumerate() {
+                        let column = block * values + one;
+                        for other in 0..values {
+                            covariance[(block * values + other, column)] += along(block * values + other, weights);
+                        }
+                    }
                 }
+                covariance * variance
             }
-        }
-        let sums = split.column_iter().map(|column| dot(column.as_slice(), residual)).collect();
-        if !basis.is_empty() {
-            let span = DMatrix::from_fn(readings, basis.len(), |row, column| basis[column][row]);
-            // A product with a transposed matrix is several times as fast as `tr_mul`.
-            let inside = span.transpose() * &split;
-            split -= span * inside;
-        }
-        let covariance = split.transpose() * errors.times(&split);
+            Errors::Correlated(errors) => {
+                let mut covariance = DMatrix::zeros(count, count);
+                let places: Vec<usize> = (0..count).collect();
+                // Some columns at once: all of them are as many as the square of the blocks.
+                for some in places.chunks(AT_ONCE) {
+                    let mut spread = DMatrix::zeros(readings, some.len());
+                    for (place, column) in some.iter().enumerate() {
+                        entries(*column).for_each(|(reading, weight)| spread[(reading, place)] = weight);
+                    }
+                    remove(basis, &mut spread);
+                    let mut spread = errors.times(&spread);
+                    remove(basis, &mut spread);
+                    for (place, column) in some.iter().enumerate() {
+                        let spread = spread.column(place);
+                        (0..count).for_each(|other| covariance[(other, *column)] = along(other, spread.as_slice()));
+                    }
+                }
+                covariance
+            }
+        };
         Self { sums, covariance }
     }
 
@@ -141,6 +161,19 @@ impl Sums {
             chi2_tail(ratio * freedom, freedom)
         };
         Some(Dispersion { ratio, freedom, below, p })
+    }
+}
+
+/// Columns whose covariance is computed together.
+const AT_ONCE: usize = 16;
+
+/// Takes orthonormal columns out of others.
+fn remove(basis: &[Vec<f64>], columns: &mut DMatrix<f64>) {
+    for mut column in columns.column_iter_mut() {
+        for known in basis {
+            let share = dot(known, column.as_slice());
+            column.as_mut_slice().iter_mut().zip(known).for_each(|(entry, known)| *entry -= share * known);
+        }
     }
 }
 

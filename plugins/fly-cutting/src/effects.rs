@@ -2,11 +2,14 @@
 
 use std::f64::consts::TAU;
 
-use runout_core::model::{Effect, Parameter, Setting};
+use runout_core::{
+    Complex64,
+    model::{Effect, Parameter, Setting},
+};
 
 use crate::{
     heights::Heights,
-    passes::{Applied, Cut, FIRST_ORDER, Line, ORDERS, Surface, legendre},
+    passes::{Applied, Cut, FIRST_ORDER, Line, ORDERS, PassTurns, Surface, legendre},
 };
 
 /// An effect of the library.
@@ -128,8 +131,9 @@ impl Missing {
         let mut columns = vec![Vec::with_capacity(heights.len()); count];
         let mut applied = Applied::none();
         self.apply(values, &mut applied);
-        let line = applied.lines.first().copied();
+        let line = applied.lines.first().map(|line| (*line, PassTurns::of(line.ratio, &surface.pass)));
         for row in &heights.rows {
+            let of_row = line.as_ref().map_or(Complex64::ZERO, |(line, _)| Complex64::cis(line.at(0.0, row)));
             for point in row.points.clone() {
                 let (pass, beside_mm) = (f64::from(surface.pass[point]), surface.beside_mm[point]);
                 let mut add =
@@ -150,12 +154,11 @@ impl Missing {
                         add(&[-1e6 * square / (depth_mm * (depth_mm + cut.nose_mm))]);
                     }
                     Self::SpindleLine(_) | Self::TiltLine => {
-                        let Some(line) = line else { continue };
+                        let Some((line, turns)) = &line else { continue };
                         let lever = line.lever(row);
-                        let (sine, cosine) = line.at(pass, row).sin_cos();
-                        let turned = -line.amplitude * lever * sine;
-                        let turns = pass + row.angle / TAU;
-                        add(&[TAU * turns * turned, lever * cosine, turned.to_radians()]);
+                        let unit = turns.at(surface.pass[point]) * of_row;
+                        let turned = -line.amplitude * lever * unit.im;
+                        add(&[TAU * (pass + row.angle / TAU) * turned, lever * unit.re, turned.to_radians()]);
                     }
                 }
             }

@@ -5,6 +5,8 @@
 
 use std::f64::consts::TAU;
 
+use runout_core::Complex64;
+
 use crate::{
     config::FlyCuttingConfig,
     heights::{Heights, Row},
@@ -37,6 +39,38 @@ impl Line {
     /// Phase at a pass, in radians.
     pub(crate) fn at(&self, pass: f64, row: &Row) -> f64 {
         TAU * self.ratio * (pass + row.angle / TAU) + self.phase
+    }
+}
+
+/// How far a line of some periods a turn is at consecutive passes, as numbers on the unit circle.
+#[derive(Debug, Clone)]
+pub(crate) struct PassTurns {
+    first: i64,
+    units: Vec<Complex64>,
+}
+
+impl PassTurns {
+    fn new(ratio: f64, first: i64, count: usize) -> Self {
+        // Whole turns cancel before they cost digits.
+        let unit = |index: usize| Complex64::cis(TAU * (ratio.fract() * (first as f64 + index as f64)).fract());
+        Self { first, units: (0..count).map(unit).collect() }
+    }
+
+    /// At the passes of a surface.
+    pub(crate) fn of(ratio: f64, passes: &[i32]) -> Self {
+        let low = i64::from(passes.iter().min().copied().unwrap_or(0));
+        let high = i64::from(passes.iter().max().copied().unwrap_or(-1));
+        Self::new(ratio, low, (high - low + 1) as usize)
+    }
+
+    /// At one of these passes.
+    pub(crate) fn at(&self, pass: i32) -> Complex64 {
+        self.units[(i64::from(pass) - self.first) as usize]
+    }
+
+    /// From one of these passes on.
+    fn from(&self, pass: i64) -> &[Complex64] {
+        &self.units[(pass - self.first) as usize..]
     }
 }
 
@@ -137,40 +171,36 @@ impl Cut {
     }
 
     /// Height of the tip at consecutive passes, in nm.
-    fn tips(&self, row: &Row, first: i64, count: usize) -> Vec<f64> {
-        let mut tips = vec![0.0; count];
-        for line in &self.applied.lines {
-            let size = line.amplitude * line.lever(row);
-            let (step_sine, step_cosine) = (TAU * line.ratio).sin_cos();
-            let (mut sine, mut cosine) = (0.0, 0.0);
-            for (index, tip) in tips.iter_mut().enumerate() {
-                // A rotation by a constant angle, begun anew before its rounding grows.
-                if index % 64 == 0 {
-                    (sine, cosine) = line.at(first as f64 + index as f64, row).sin_cos();
-                }
-                *tip += size * cosine;
-                (sine, cosine) = (sine * step_cosine + cosine * step_sine, cosine * step_cosine - sine * step_sine);
+    fn tips(&self, row: &Row, turns: &[PassTurns], first: i64, count: usize, tips: &mut Vec<f64>) {
+        tips.clear();
+        tips.resize(count, 0.0);
+        for (line, turns) in self.applied.lines.iter().zip(turns) {
+            let of_row = Complex64::from_polar(line.amplitude * line.lever(row), line.at(0.0, row));
+            for (tip, unit) in tips.iter_mut().zip(turns.from(first)) {
+                *tip += of_row.re * unit.re - of_row.im * unit.im;
             }
         }
-        if self.applied.table_nm.iter().any(|size| *size != 0.0) {
+        if !self.is_straight() {
             for (index, tip) in tips.iter_mut().enumerate() {
                 let values = legendre(self.table_at(first as f64 + index as f64, row));
                 *tip += values.iter().zip(self.applied.table_nm).map(|(value, size)| value * size).sum::<f64>();
             }
         }
-        tips
+    }
+
+    /// Whether the table is.
+    fn is_straight(&self) -> bool {
+        self.applied.table_nm.iter().all(|size| *size == 0.0)
     }
 
     /// Passes to each side of the nearest one that may be lower than it.
-    fn reach(&self, row: &Row, tips: impl FnOnce() -> Vec<f64>) -> i64 {
+    fn reach(&self, row: &Row, largest_step: impl FnOnce() -> f64) -> i64 {
         let waves: f64 = self.applied.lines.iter().map(|line| 2.0 * (line.amplitude * line.lever(row)).abs()).sum();
-        let is_straight = self.applied.table_nm.iter().all(|size| *size == 0.0);
-        if waves == 0.0 && is_straight {
+        if waves == 0.0 && self.is_straight() {
             return 0;
         }
         // What is not a line is smooth: its step from pass to pass is bounded.
-        let smooth = |tips: Vec<f64>| tips.windows(2).map(|pair| (pair[1] - pair[0]).abs()).fold(0.0, f64::max);
-        let steps = if is_straight { 0.0 } else { smooth(tips()) };
+        let steps = if self.is_straight() { 0.0 } else { largest_step() };
         let per_pass_mm = self.feed_mm * row.cosine;
         let most = (2.0 * self.nose_mm / per_pass_mm).ceil() as i64;
         let mut reach = 1;
@@ -192,35 +222,77 @@ impl Cut {
             pass: Vec::with_capacity(heights.len()),
             beside_mm: Vec::with_capacity(heights.len()),
         };
-        for row in &heights.rows {
-            self.row(heights, row, phase_mm, &mut surface);
+        if heights.len() == 0 {
+            return surface;
+        }
+        let rows = || heights.rows.iter().filter(|row| !row.points.is_empty());
+        let ends = rows().map(|row| self.ends(heights, row, phase_mm));
+        let whole =
+            ends.fold([f64::INFINITY, f64::NEG_INFINITY], |whole, [low, high]| [whole[0].min(low), whole[1].max(high)]);
+        let reach = |row| if self.is_straight() { self.reach(row, || 0.0) } else { self.most(row) };
+        let beyond = rows().map(reach).max().unwrap_or(0);
+        let (first, last) = (whole[0].round() as i64 - beyond, whole[1].round() as i64 + beyond);
+        let count = (last - first + 1).max(0) as usize;
+        let turns: Vec<PassTurns> =
+            self.applied.lines.iter().map(|line| PassTurns::new(line.ratio, first, count)).collect();
+        let mut tips = Vec::new();
+        for row in rows() {
+            self.row(heights, row, phase_mm, &turns, &mut tips, &mut surface);
         }
         surface
     }
 
-    fn row(&self, heights: &Heights, row: &Row, phase_mm: f64, surface: &mut Surface) {
-        let x_mm = &heights.x_mm[row.points.clone()];
+    /// Passes to each side beyond which the edge does not reach.
+    fn most(&self, row: &Row) -> i64 {
+        (2.0 * self.nose_mm / (self.feed_mm * row.cosine)).ceil() as i64
+    }
+
+    /// Turns from the pass 0 to the first and the last point of a row.
+    fn ends(&self, heights: &Heights, row: &Row, phase_mm: f64) -> [f64; 2] {
         let start_mm = self.first_mm(row) + phase_mm;
-        let turns = |x: f64| (x - start_mm) / self.feed_mm;
-        let [low, high] = [x_mm.first(), x_mm.last()].map(|x| turns(x.copied().unwrap_or(start_mm)));
-        // Passes of the row, so that the reach is known before the ends are.
-        let most = (2.0 * self.nose_mm / (self.feed_mm * row.cosine)).ceil() as i64;
-        let reach = self.reach(row, || self.tips(row, low.round() as i64, (high - low) as usize + 2)).min(most);
+        [row.points.start, row.points.end - 1].map(|point| (heights.x_mm[point] - start_mm) / self.feed_mm)
+    }
+
+    fn row(
+        &self,
+        heights: &Heights,
+        row: &Row,
+        phase_mm: f64,
+        turns: &[PassTurns],
+        tips: &mut Vec<f64>,
+        surface: &mut Surface,
+    ) {
+        let [low, high] = self.ends(heights, row, phase_mm);
+        let largest_step = || {
+            let mut tips = Vec::new();
+            self.tips(row, turns, low.round() as i64, (high.round() - low.round()) as usize + 1, &mut tips);
+            tips.windows(2).map(|pair| (pair[1] - pair[0]).abs()).fold(0.0, f64::max)
+        };
+        let reach = self.reach(row, largest_step).min(self.most(row));
+        // Places count from the first pass, so that none is below 0.
         let first = low.round() as i64 - reach;
         let count = (high.round() as i64 + reach - first + 1) as usize;
-        let tips = if reach == 0 { vec![0.0; count] } else { self.tips(row, first, count) };
+        if reach == 0 {
+            tips.clear();
+            tips.resize(count, 0.0);
+        } else {
+            self.tips(row, turns, first, count, tips);
+        }
         let square = self.nose_mm * self.nose_mm;
         let parabola = 0.5e6 / self.nose_mm;
         let per_pass_mm = self.feed_mm * row.cosine;
         let [tilt_x, tilt_y] = self.applied.tilt_urad;
         let shape_nm: f64 = self.across(row).iter().zip(self.applied.shape_nm).map(|(value, size)| value * size).sum();
-        for x in x_mm {
-            let at = turns(*x);
-            let nearest = at.round() as i64;
-            let mut best = (f64::INFINITY, 0_i64, 0.0);
-            let mut cut = |pass: i64| {
+        let start_mm = self.first_mm(row) + phase_mm + self.feed_mm * first as f64;
+        let per_mm = self.feed_mm.recip();
+        let reach = reach as usize;
+        for x in &heights.x_mm[row.points.clone()] {
+            let at = (x - start_mm) * per_mm;
+            let nearest = ((at + 0.5) as usize).clamp(reach, count - 1 - reach);
+            let mut best = (f64::INFINITY, 0, 0.0);
+            let mut cut = |pass: usize| {
                 let beside_mm = (at - pass as f64) * per_pass_mm;
-                let (tip, across) = (tips[(pass - first) as usize], beside_mm * beside_mm);
+                let (tip, across) = (tips[pass], beside_mm * beside_mm);
                 // An arc is nowhere lower than its parabola: most passes beside the nearest are not looked at.
                 if across > square || across * parabola + tip > best.0 {
                     return;
@@ -231,10 +303,13 @@ impl Cut {
                 }
             };
             cut(nearest);
-            (1..=reach).for_each(|beside| [nearest - beside, nearest + beside].into_iter().for_each(&mut cut));
+            for beside in 1..=reach {
+                cut(nearest - beside);
+                cut(nearest + beside);
+            }
             // µrad times mm is nm.
             surface.height_nm.push(best.0 + shape_nm + tilt_x * x + tilt_y * row.y_mm);
-            surface.pass.push(best.1 as i32);
+            surface.pass.push((first as f64 + best.1 as f64) as i32);
             surface.beside_mm.push(best.2);
         }
     }

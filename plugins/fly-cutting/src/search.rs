@@ -11,7 +11,7 @@ use rustfft::FftPlanner;
 
 use crate::{
     heights::{Heights, Row},
-    passes::{Cut, Line, Surface},
+    passes::{Cut, Line, PassTurns, Surface},
 };
 
 /// Frequencies for each that the passes resolve.
@@ -70,6 +70,7 @@ impl Left<'_> {
     pub(crate) fn aliases(&self, fraction: f64, tilts: bool, highest: usize, lowest: f64) -> Vec<(f64, Complex64)> {
         let fraction = fraction.rem_euclid(1.0);
         let mut weight = 0.0;
+        let turns = PassTurns::of(fraction, &self.surface.pass);
         let sums: Vec<(f64, Complex64)> = self
             .heights
             .rows
@@ -77,11 +78,8 @@ impl Left<'_> {
             .map(|row| {
                 let lever = lever(row, tilts);
                 weight += lever * lever * row.points.len() as f64;
-                let turned = |point: usize| {
-                    let turns = fraction * f64::from(self.surface.pass[point]);
-                    Complex64::from_polar(self.residual_nm[point] * lever, -TAU * turns)
-                };
-                (row.angle, row.points.clone().map(turned).sum())
+                let turned = |point: usize| self.residual_nm[point] * turns.at(self.surface.pass[point]).conj();
+                (row.angle, lever * row.points.clone().map(turned).sum::<Complex64>())
             })
             .collect();
         let at = |ratio: f64, conjugate: bool| -> (f64, Complex64) {
@@ -179,22 +177,36 @@ impl Left<'_> {
         let length = f64::from(high - low).max(1.0);
         let step = FEED_STEP / length;
         let count = (FEEDS / step).ceil().min(400.0) as i32;
-        let explained = |scale: f64| {
-            let feed_mm = cut.declared_mm * (1.0 + scale);
-            let mut sum = Complex64::ZERO;
-            for row in &self.heights.rows {
-                let start_mm = row.sag_mm + feed_mm * row.angle / TAU;
-                for point in row.points.clone() {
-                    let turns = (self.heights.x_mm[point] - start_mm) / feed_mm;
-                    sum += Complex64::from_polar(heights[point] - mean, -TAU * turns);
+        // Feeds evenly by their inverse: from one to the next, the phase of a point turns by a constant.
+        let per_mm = (cut.declared_mm * (1.0 + cut.applied.feed_scale)).recip();
+        let mut sums = vec![Complex64::ZERO; 2 * count as usize + 1];
+        let (mut turned, mut steps): (Vec<Complex64>, Vec<Complex64>) = (Vec::new(), Vec::new());
+        for row in &self.heights.rows {
+            turned.clear();
+            steps.clear();
+            for point in row.points.clone() {
+                let turns = (self.heights.x_mm[point] - row.sag_mm) * per_mm;
+                let first = (1.0 + step * f64::from(count)) * turns - row.angle / TAU;
+                turned.push(Complex64::from_polar(heights[point] - mean, -TAU * first));
+                steps.push(Complex64::from_polar(1.0, TAU * step * turns));
+            }
+            for sum in &mut sums {
+                for (turned, step) in turned.iter_mut().zip(&steps) {
+                    *sum += *turned;
+                    *turned *= step;
                 }
             }
-            sum.norm_sqr()
+        }
+        let scale = |index: usize| {
+            let share = 1.0 + step * (f64::from(count) - index as f64);
+            (cut.declared_mm * per_mm * share).recip() - 1.0
         };
-        let scales = (-count..=count).map(|index| cut.applied.feed_scale + step * f64::from(index));
-        let best = scales.map(|scale| (scale, explained(scale))).max_by(|one, other| one.1.total_cmp(&other.1))?;
+        let explained = |index: usize| sums[index].norm_sqr();
+        let best = (0..sums.len()).max_by(|one, other| explained(*one).total_cmp(&explained(*other)))?;
+        let declared = explained(count as usize);
+        let best = (scale(best), explained(best));
         let moved = (best.0 - cut.applied.feed_scale).abs() * farthest;
-        (moved > 0.5 * FEED_STEP && best.1 > 1.1 * explained(cut.applied.feed_scale)).then_some(best.0)
+        (moved > 0.5 * FEED_STEP && best.1 > 1.1 * declared).then_some(best.0)
     }
 }
 

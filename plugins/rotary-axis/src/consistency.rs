@@ -8,6 +8,7 @@ use nalgebra::Vector3;
 use runout_core::{
     consistency::{Check, Kind, LinearFit, Shift, Structure, Test, judge, linear, repeats::repeats},
     numerics::{least_squares::Basis, statistics::f_tail},
+    points::mistakes,
     summary::NamedValue,
 };
 
@@ -112,10 +113,27 @@ pub(crate) fn checks(axis: Axis, campaign: &Campaign, effects: &[Column], found:
         Noise::Column | Noise::Stated(_) => Some(linear::residual(left, dof, f64::INFINITY)),
         Noise::Unknown => None,
     };
-    let mut all: Vec<Check> = of_noise.into_iter().collect();
+    let mut all: Vec<Check> = of_noise.into_iter().chain(of_passes(campaign)).collect();
     all.extend(closing_check(campaign, effects));
     all.extend(of_rows(axis, campaign, effects));
     all
+}
+
+/// Passes of a ball with readings of another place.
+pub(crate) fn of_passes(campaign: &Campaign) -> Option<Check> {
+    let readings = || campaign.readings.iter();
+    let place: Vec<usize> =
+        readings().map(|reading| reading.ball * campaign.commands_deg.len() + reading.command).collect();
+    let mut passes: Vec<(String, Vec<usize>)> = Vec::new();
+    for (row, (reading, pass)) in readings().zip(&campaign.pass).enumerate() {
+        let name = format!("pass {} of ball {}", pass + 1, campaign.balls[reading.ball]);
+        match passes.iter_mut().find(|(known, _)| *known == name) {
+            Some((_, rows)) => rows.push(row),
+            None => passes.push((name, vec![row])),
+        }
+    }
+    let values: Vec<[f64; 3]> = readings().map(|reading| reading.value.into()).collect();
+    mistakes::passes(&place, &passes, &values)
 }
 
 /// The tests of the rows that component errors cannot reach.

@@ -22,7 +22,7 @@ use runout_core::{
 use crate::{
     campaign::Campaign,
     config::RotaryAxis,
-    consistency::{Offsets, combination},
+    consistency::{Offsets, combination, of_passes},
     effects::{CANDIDATES, Candidate, Shapes, TRIED, USUAL, tried},
     nest::{self, Nest},
     noise::Noise,
@@ -60,6 +60,10 @@ impl PointModel for RotaryAxis {
         self.take_known(&mut campaign, &settings.known);
         // What is taken from the readings is known with 0 more of it, and not looked for.
         settings.known.iter_mut().for_each(|known| known.values.iter_mut().for_each(|value| *value = 0.0));
+        if of_passes(&campaign).is_some_and(|check| check.bars_verdict()) {
+            // Readings at wrong places show effects that are not there.
+            settings.max_added = 0;
+        }
         let mut run = self.settled(&campaign, &settings).map_err(failure)?;
         let doubtful = run.doubtful();
         if !doubtful.is_empty() {

@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector};
 use runout_core::{
     Error, Result,
     consistency::Check,
-    points::{PointColumn, PointKind::Number, Points},
+    points::{PointColumn, PointKind::Number, Points, mistakes},
 };
 
 pub(crate) use crate::measured::COMPONENTS;
@@ -114,7 +114,7 @@ impl Campaign {
         }
         let rows: Vec<[f64; 3]> = (0..count).map(|row| commands.map(|column| column[row])).collect();
         let (places_mm, place_of) = distinct(&rows);
-        let Measured { axes: measured, readings_um, notes, checks } = Measured::of(points, &rows)?;
+        let Measured { axes: measured, readings_um, notes, mut checks } = Measured::of(points, &rows)?;
         let time = scaled(optional("time_s").map(|column| column.values.as_slice()), count);
         let repeat = match optional("repeat") {
             Some(column) => column
@@ -129,6 +129,13 @@ impl Campaign {
                 .collect::<Result<Vec<usize>>>()?,
             None => occurrences(&place_of, places_mm.len()),
         };
+        let last = repeat.iter().copied().max().unwrap_or(0);
+        let rows_of = |pass: usize| (0..count).filter(|row| repeat[*row] == pass).collect::<Vec<usize>>();
+        let passes: Vec<(String, Vec<usize>)> = (0..=last.min(count))
+            .map(|pass| (format!("pass {pass}"), rows_of(pass)))
+            .filter(|(_, rows)| !rows.is_empty())
+            .collect();
+        checks.extend(mistakes::passes(&place_of, &passes, &readings_um));
         let stated = optional("std_um").map(|column| column.values.as_slice());
         if let Some(row) = stated.and_then(|values| values.iter().position(|value| *value <= 0.0)) {
             return Err(refuse(format!("row {} of the column `std_um` must be above 0 µm", row + 1)));

@@ -28,6 +28,9 @@ pub struct SpatialErrorConfig {
     /// Offset of the measured point from the last axis of the chain, in mm.
     #[serde(default)]
     pub tool_mm: [f64; 3],
+    /// Periods of the ball screws or scales of X, Y and Z, in mm; 0 where one is not known: `diagnose` then looks for it.
+    #[serde(default)]
+    pub pitch_mm: [f64; 3],
     /// Linear axes from the base to the tool.
     #[serde(default = "xyz")]
     pub chain: [Letter; 3],
@@ -49,6 +52,7 @@ impl Default for SpatialErrorConfig {
             declared: rigid(),
             kriging: Kriging::default(),
             tool_mm: [0.0; 3],
+            pitch_mm: [0.0; 3],
             chain: xyz(),
             query: Query::default(),
             compensate: Compensate::default(),
@@ -261,6 +265,12 @@ impl SpatialErrorConfig {
         self.kriging.check().map_err(|fault| fault.under("kriging"))?;
         if let Some(index) = self.tool_mm.iter().position(|value| !value.is_finite()) {
             return Err(Fault::at("tool_mm", format!("expected lengths in mm, found {}", self.tool_mm[index])));
+        }
+        if let Some(value) = self.pitch_mm.iter().find(|value| !(value.is_finite() && **value >= 0.0)) {
+            return Err(Fault::at(
+                "pitch_mm",
+                format!("expected periods in mm, 0 where one is not known, found {value}"),
+            ));
         }
         let mut axes = self.chain_axes();
         axes.sort_unstable();

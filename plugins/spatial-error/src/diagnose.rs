@@ -3,13 +3,12 @@
 //! Long because the loop and what it says of each step belong together.
 
 use runout_core::{
-    Error, Result,
+    Result,
+    consistency::Check,
     model::{
         Effect,
         closed_loop::Settings,
-        diagnosis::{
-            Added, BiasPerUnit, Blind, Diagnosis, Estimated, Level, Moved, Refused, Step, Unexplained, Verdict,
-        },
+        diagnosis::{Added, BiasPerUnit, Blind, Diagnosis, Level, Moved, Refused, Step, Unexplained, Verdict},
     },
     points::Points,
     stage::{Outcome, PointDiagnosis, PointModel},
@@ -24,6 +23,7 @@ use crate::{
     level::level,
     likelihood::Prior,
     noise::Noise,
+    parameters::{parameters, settled, subtract_known},
     solve::{Solution, families, prior, solve},
     suspects::{Group, groups},
     terms::Term,
@@ -45,7 +45,7 @@ impl PointModel for SpatialError {
         let mut campaign = self.campaign(points)?;
         subtract_known(&mut campaign, settings)?;
         let before = solve(&campaign, &self.config, &[])?;
-        let candidates = candidates();
+        let candidates = candidates(&campaign, self.config.pitch_mm);
         let jumps = jumps(&campaign);
         let kinds = missing();
         let effects = self.effects();
@@ -67,17 +67,21 @@ impl PointModel for SpatialError {
         };
         let given = self.given(&campaign, &before);
         let mut tracing =
-            Tracing::new(&campaign, declared.clone(), &candidates, &jumps, &families, given.as_ref(), allowed);
-        let found = tracing.run(settings.max_added.min(MOST_ADDED)).unwrap_or_default();
-        let doubts = std::mem::take(&mut tracing.doubts);
-        let (strangers, added): (Vec<Found>, Vec<Found>) = found.into_iter().partition(|found| found.jump);
+            Tracing::new(&campaign, declared.clone(), candidates, &jumps, &families, given.as_ref(), allowed);
+        // Readings at wrong places show effects that are not there.
+        let is_sound = !campaign.checks.iter().any(Check::bars_verdict);
+        let most = if is_sound { settings.max_added.min(MOST_ADDED) } else { 0 };
+        let found = tracing.run(most).unwrap_or_default();
+        let Tracing { doubts, mut candidates, .. } = tracing;
+        let (added, strangers): (Vec<Found>, Vec<Found>) = found.into_iter().partition(Found::is_added);
+        let mut chosen: Vec<Candidate> = added.iter().map(|found| candidates[found.members[0]].clone()).collect();
+        let after = if chosen.is_empty() { before.clone() } else { settled(&campaign, self, &mut chosen)? };
+        added.iter().zip(chosen).for_each(|(found, chosen)| candidates[found.members[0]] = chosen);
         let terms_of = |found: &Found| candidates[found.members[0]].terms.clone();
         let terms: Vec<Term> = added.iter().flat_map(terms_of).collect();
-        let after = if terms.is_empty() { before.clone() } else { solve(&campaign, &self.config, &terms)? };
         let name = |candidate: &Candidate| {
             let effect = &effects[candidate.effect];
-            let order = candidate.order.map_or_else(String::new, |order| format!(" order {order}"));
-            (effect.id.clone(), format!("{}{order}", effect.targets.join(" ")))
+            (effect.id.clone(), format!("{}{}", effect.targets.join(" "), candidate.shape.words()).trim().to_owned())
         };
         let names: Vec<(String, String, Term)> = added
             .iter()
@@ -93,7 +97,18 @@ impl PointModel for SpatialError {
             Conclusion { separator: self, campaign: &campaign, solution: &after, names: &names }.outcome()?;
         let mut unexplained: Vec<Unexplained> = strangers
             .iter()
-            .map(|found| self.unexplained(&campaign, &terms, &jumps[found.members[0]]))
+            .map(|found| {
+                let index = found.members[0];
+                let columns = if found.jump { &jumps[index].terms } else { &candidates[index].terms };
+                let left = self.left(&campaign, &terms, columns)?;
+                let what = if found.jump {
+                    format!("a jump by {} {}", campaign.displacement(left.by_um), jumps[index].place)
+                } else {
+                    effects[candidates[index].effect].name()
+                };
+                let place = std::iter::once(what).chain(found.undecided.clone()).collect::<Vec<_>>().join(": ");
+                Ok(unexplained(left.rms_um, place))
+            })
             .collect::<Result<_>>()?;
         if unexplained.is_empty() {
             unexplained.extend(groups(&campaign, &after).iter().map(|group| together(&campaign, group)));
@@ -169,6 +184,12 @@ impl PointModel for SpatialError {
     }
 }
 
+/// Sizes of columns, where each is along one component, and what they add, root mean square.
+struct Left {
+    by_um: [f64; 3],
+    rms_um: f64,
+}
+
 /// What separates effects that one layout confounds.
 const DISTINGUISHED_BY: &str = "a second campaign with another `tool_mm`, or in another order of the places";
 
@@ -189,29 +210,20 @@ impl SpatialError {
         Some(prior)
     }
 
-    /// Size and place of a jump.
-    fn unexplained(&self, campaign: &Campaign, terms: &[Term], jump: &crate::effects::Jump) -> Result<Unexplained> {
-        let all: Vec<Term> = terms.iter().chain(&jump.terms).copied().collect();
+    /// What columns that are not added would take.
+    fn left(&self, campaign: &Campaign, terms: &[Term], columns: &[Term]) -> Result<Left> {
+        let all: Vec<Term> = terms.iter().chain(columns).copied().collect();
         let solution = solve(campaign, &self.config, &all)?;
-        let size = |wanted: &Term| {
-            let column = solution.terms.iter().position(|term| term == wanted);
-            column.map_or(f64::NAN, |column| solution.joint.trend[column])
+        let size = |wanted: &Term| solution.column(*wanted).map_or(f64::NAN, |column| solution.joint.trend[column]);
+        let each = columns.iter().map(|wanted| (wanted, size(wanted))).filter(|(_, size)| size.is_finite());
+        let adds = |place: &[f64; 3]| {
+            let of = |(wanted, size): (&Term, f64)| wanted.at(&campaign.volume, *place, 0.0).map(|adds| adds * size);
+            each.clone().map(of).fold([0.0; 3], |sum, one| [0, 1, 2].map(|axis| sum[axis] + one[axis]))
         };
-        let mut squares = 0.0;
-        for (wanted, size) in
-            jump.terms.iter().map(|wanted| (wanted, size(wanted))).filter(|(_, size)| size.is_finite())
-        {
-            let adds = campaign.places_mm.iter().map(|place| wanted.at(&campaign.volume, *place, 0.0));
-            squares += adds.flatten().map(|adds| (adds * size).powi(2)).sum::<f64>();
-        }
-        let by_um = solution.by_axis(jump.terms.iter().map(size), f64::NAN);
-        Ok(Unexplained {
-            station: None,
-            sensor: None,
-            setup: None,
-            orders: [0, 0],
+        let squares: f64 = campaign.places_mm.iter().flat_map(adds).map(|adds| adds * adds).sum();
+        Ok(Left {
+            by_um: solution.by_axis(columns.iter().map(size), f64::NAN),
             rms_um: (squares / (campaign.measured.len() * campaign.places_mm.len()) as f64).sqrt(),
-            place: format!("a jump by {} {}", campaign.displacement(by_um), jump.place),
         })
     }
 
@@ -240,76 +252,17 @@ impl SpatialError {
 /// Neighbouring places that err together.
 fn together(campaign: &Campaign, group: &Group) -> Unexplained {
     let squares: f64 = group.by_um.iter().flatten().filter(|by| by.is_finite()).map(|by| by * by).sum();
-    Unexplained {
-        station: None,
-        sensor: None,
-        setup: None,
-        orders: [0, 0],
-        rms_um: (squares / (campaign.measured.len() * campaign.places_mm.len()) as f64).sqrt(),
-        place: format!("neighbouring places: {}", group.named(campaign)),
-    }
+    let rms_um = (squares / (campaign.measured.len() * campaign.places_mm.len()) as f64).sqrt();
+    unexplained(rms_um, format!("neighbouring places: {}", group.named(campaign)))
 }
 
-/// Takes effects that are declared with their values out of the readings.
-fn subtract_known(campaign: &mut Campaign, settings: &Settings) -> Result<()> {
-    let kinds = missing();
-    for setting in &settings.known {
-        let kind = kinds[setting.effect];
-        let (order, values) = match (kind.has_order(), setting.values.split_first()) {
-            (true, Some((order, rest))) => {
-                let orders = kind.orders();
-                let is_one = order.fract() == 0.0 && *order >= *orders.start() as f64 && *order <= *orders.end() as f64;
-                if !is_one {
-                    let effect = kind.effect();
-                    let problem = format!(
-                        "its order is a whole number from {} to {}, found {order}",
-                        orders.start(),
-                        orders.end()
-                    );
-                    return Err(Error::new("take out the known effect", effect.name(), problem));
-                }
-                (*order as usize, rest.to_vec())
-            }
-            _ => (1, setting.values.clone()),
-        };
-        for (term, value) in kind.terms(order).into_iter().zip(values) {
-            for row in 0..campaign.place_of.len() {
-                let place = campaign.places_mm[campaign.place_of[row]];
-                let adds = term.at(&campaign.volume, place, campaign.time[row]);
-                campaign.readings_um[row].iter_mut().zip(adds).for_each(|(reading, adds)| *reading -= value * adds);
-            }
-        }
-    }
-    Ok(())
+fn unexplained(rms_um: f64, place: String) -> Unexplained {
+    Unexplained { station: None, sensor: None, setup: None, orders: [0, 0], rms_um, place }
 }
 
-fn parameters(
-    candidate: &Candidate,
-    effect: &Effect,
-    solution: &Solution,
-    trend_std: Option<&Vec<f64>>,
-) -> Vec<Estimated> {
-    let names = &effect.parameters;
-    let mut all = Vec::new();
-    if let Some(order) = candidate.order {
-        all.push(Estimated {
-            name: names[0].name.clone(),
-            value: order as f64,
-            std: None,
-            unit: names[0].unit.clone(),
-        });
-    }
-    let rest = &names[usize::from(candidate.order.is_some())..];
-    for (parameter, wanted) in rest.iter().zip(&candidate.terms) {
-        let Some(column) = solution.terms.iter().position(|term| term == wanted) else { continue };
-        all.push(Estimated {
-            name: parameter.name.clone(),
-            value: solution.joint.trend[column],
-            std: trend_std.map(|std| std[column]),
-            unit: parameter.unit.clone(),
-        });
-    }
-    all
+/// Whether a parameter in a unit is a size.
+fn is_size(unit: &str) -> bool {
+    unit.starts_with("um") || unit == "urad"
 }
 
 fn verdict(campaign: &Campaign, nothing_added: bool, nothing_strange: bool) -> Verdict {
@@ -331,17 +284,23 @@ fn blind(
     effects: &[Effect],
     asked: &[usize],
 ) -> Vec<Blind> {
+    let searched = |effect: usize| candidates.iter().any(|one| one.effect == effect && one.shape.is_searched());
+    // Where shapes are searched, some of them are seen.
+    let asked: Vec<usize> = asked.iter().copied().filter(|effect| !searched(*effect)).collect();
+    let (candidates, observable): (Vec<&Candidate>, Vec<bool>) =
+        candidates.iter().zip(observable).filter(|(one, _)| !one.shape.is_searched()).unzip();
     let all: Vec<Term> = candidates.iter().flat_map(|candidate| candidate.terms.iter().copied()).collect();
     let terms: Vec<Term> = solution.terms.iter().chain(&all).copied().collect();
     let (normal, _) = solution.joint.equations(&campaign.data(&terms, solution.fitted.as_deref()));
     let fitted = solution.terms.len();
     let mut blind = Vec::new();
-    for effect in asked.iter().copied() {
-        let tolerance = effects[effect].parameters.last().map_or(1.0, |parameter| parameter.tolerance);
+    for effect in asked {
+        let size = effects[effect].parameters.iter().find(|parameter| is_size(&parameter.unit));
+        let tolerance = size.map_or(1.0, |parameter| parameter.tolerance);
         let mut visible = false;
         let mut largest: f64 = 0.0;
         let mut first = fitted;
-        for (candidate, observable) in candidates.iter().zip(observable) {
+        for (candidate, observable) in candidates.iter().zip(&observable) {
             let columns = first..first + candidate.terms.len();
             first = columns.end;
             if candidate.effect != effect {
@@ -358,7 +317,7 @@ fn blind(
             }
         }
         if !visible {
-            let unit = effects[effect].parameters.last().map_or("", |parameter| &parameter.unit);
+            let unit = size.map_or("", |parameter| &parameter.unit);
             // Without an arm it displaces no measured point, and another tool by 1 nm per mm of its offset.
             let bias_per_unit = if largest > 0.0 {
                 BiasPerUnit { value: largest, unit: format!("um/({unit})"), on: "readings".into() }

@@ -1,9 +1,10 @@
-//! What the declared model may lack: errors of the axes and a drift; and jumps that no effect describes.
+//! What the declared model may lack: errors of the axes, a drift and a step of the tracker; and jumps that no effect describes.
 
 use runout_core::model::{Effect, Parameter};
 
 use crate::{
     campaign::Campaign,
+    shapes::{Shape, periods_mm, times},
     terms::{Term, Volume},
 };
 
@@ -33,15 +34,19 @@ pub(crate) enum Missing {
     Angular(usize, usize),
     /// Drift along an axis.
     Drift(usize),
+    /// Periodic positioning error of an axis.
+    Pitch(usize),
+    /// Displacement of the tracker from a time on.
+    TrackerStep,
 }
 
-/// An effect at one order, where it has orders.
+/// An effect at one shape.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Candidate {
     /// Index into [`missing`].
     pub effect: usize,
-    /// Its order.
-    pub order: Option<usize>,
+    /// Its order, period or time.
+    pub shape: Shape,
     /// Its columns.
     pub terms: Vec<Term>,
 }
@@ -60,6 +65,8 @@ pub(crate) fn missing() -> Vec<Missing> {
         all.extend(axes.map(|about| Missing::Angular(about, axis)));
     }
     all.extend(axes.map(Missing::Drift));
+    all.extend(axes.map(Missing::Pitch));
+    all.push(Missing::TrackerStep);
     all
 }
 
@@ -90,19 +97,52 @@ impl Missing {
                 let parameters = vec![parameter("change", "um", 5.0), parameter("bend", "um", 2.0)];
                 ("thermal-drift", LETTERS[axis].to_lowercase(), parameters)
             }
+            Self::Pitch(axis) => {
+                let parameters = vec![
+                    parameter("period", "mm", 10.0),
+                    parameter("amplitude", "um", 5.0),
+                    parameter("phase", "deg", 90.0),
+                ];
+                ("axis-pitch", LETTERS[axis].into(), parameters)
+            }
+            Self::TrackerStep => {
+                let steps = ["step_x", "step_y", "step_z"].map(|name| parameter(name, "um", 5.0));
+                let parameters = std::iter::once(parameter("at", "campaign", 0.5)).chain(steps).collect();
+                return Effect { id: "tracker-step".into(), targets: Vec::new(), parameters };
+            }
         };
         Effect { id: id.into(), targets: vec![target], parameters }
     }
 
-    /// Whether its first parameter is an order.
+    /// Whether its first parameter is its shape.
     #[must_use]
-    pub(crate) fn has_order(self) -> bool {
-        matches!(self, Self::Positioning(_) | Self::Straightness(..) | Self::Angular(..))
+    pub(crate) fn has_shape(self) -> bool {
+        !matches!(self, Self::Scale(_) | Self::Squareness(..) | Self::Drift(_))
     }
 
-    /// Its columns at an order.
+    /// The shape that its first parameter gives; the reason where it is none.
+    pub(crate) fn shape(self, value: f64) -> Result<Shape, String> {
+        let orders = self.orders();
+        let (shape, right, wanted): (_, _, String) = match self {
+            Self::Pitch(_) => (Shape::Period { mm: value, declared: true }, value > 0.0, "period is above 0 mm".into()),
+            Self::TrackerStep => (
+                Shape::From(value),
+                (0.0..1.0).contains(&value),
+                "`at` is a share of the campaign, from 0 to below 1".into(),
+            ),
+            _ => {
+                let is_one = value.fract() == 0.0 && value >= *orders.start() as f64 && value <= *orders.end() as f64;
+                let wanted = format!("order is a whole number from {} to {}", orders.start(), orders.end());
+                (Shape::Order(value as usize), is_one, wanted)
+            }
+        };
+        if right { Ok(shape) } else { Err(format!("its {wanted}, found {value}")) }
+    }
+
+    /// Its columns at a shape.
     #[must_use]
-    pub(crate) fn terms(self, order: usize) -> Vec<Term> {
+    pub(crate) fn terms(self, shape: Shape) -> Vec<Term> {
+        let order = if let Shape::Order(order) = shape { order } else { 1 };
         match self {
             Self::Scale(axis) => vec![Term::Scale(axis)],
             Self::Positioning(axis) => vec![Term::Linear { moved: axis, axis, order }],
@@ -110,6 +150,14 @@ impl Missing {
             Self::Straightness(moved, axis) => vec![Term::Linear { moved, axis, order }],
             Self::Angular(about, axis) => vec![Term::Angular { about, axis, order }],
             Self::Drift(axis) => vec![Term::Drift(axis), Term::Bend(axis)],
+            Self::Pitch(axis) => {
+                let Shape::Period { mm: period_mm, .. } = shape else { return Vec::new() };
+                [false, true].map(|cosine| Term::Pitch { axis, period_mm, cosine }).into()
+            }
+            Self::TrackerStep => {
+                let Shape::From(time) = shape else { return Vec::new() };
+                [0, 1, 2].map(|moved| Term::After { moved, time }).into()
+            }
         }
     }
 
@@ -124,17 +172,36 @@ impl Missing {
     }
 }
 
-/// Every effect at every order.
+/// Every effect at every shape; of periods those that are declared (0 where one is not), or all that are looked for.
 #[must_use]
-pub(crate) fn candidates() -> Vec<Candidate> {
+pub(crate) fn candidates(campaign: &Campaign, pitch_mm: [f64; 3]) -> Vec<Candidate> {
+    let shapes = |one: Missing| -> Vec<Shape> {
+        match one {
+            Missing::Pitch(axis) if pitch_mm[axis] > 0.0 => {
+                vec![Shape::Period { mm: pitch_mm[axis], declared: true }]
+            }
+            Missing::Pitch(axis) => {
+                periods_mm(campaign, axis).into_iter().map(|mm| Shape::Period { mm, declared: false }).collect()
+            }
+            Missing::TrackerStep => times(campaign).into_iter().map(Shape::From).collect(),
+            _ if one.has_shape() => one.orders().map(Shape::Order).collect(),
+            _ => vec![Shape::None],
+        }
+    };
     let of = |(effect, one): (usize, Missing)| {
-        one.orders().map(move |order| Candidate {
+        shapes(one).into_iter().map(move |shape| Candidate {
             effect,
-            order: one.has_order().then_some(order),
-            terms: one.terms(order),
+            shape,
+            terms: measured(campaign, one.terms(shape)),
         })
     };
     missing().into_iter().enumerate().flat_map(of).collect()
+}
+
+/// Steps of the tracker along axes that were measured; all other columns.
+pub(crate) fn measured(campaign: &Campaign, mut terms: Vec<Term>) -> Vec<Term> {
+    terms.retain(|term| !matches!(term, Term::After { moved, .. } if !campaign.measured.contains(moved)));
+    terms
 }
 
 /// A jump that no effect describes: across a plane, or within a box at a corner, along all axes that were measured.

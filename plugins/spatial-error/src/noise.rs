@@ -1,4 +1,4 @@
-//! Noise of one reading from repeats: their scatter after a smooth drift in time that is common to all places.
+//! Noise of one reading from repeats: their scatter after a smooth drift in time, and a step if there is one, that are common to all places.
 
 use nalgebra::{DMatrix, DVector};
 use runout_core::numerics::statistics::f_tail;
@@ -29,6 +29,9 @@ const FEWEST: [usize; 2] = [4, 10];
 const UNLIKE: f64 = 0.01;
 /// Highest order of the drift, and degrees of freedom that each order asks for.
 const ORDERS: [usize; 2] = [6, 12];
+/// Times of a step that are tried, and the chance of noise doing as much, times their number, below which there is one.
+const STEPS: usize = 200;
+const STEP_CHANCE: f64 = 1e-6;
 /// Scatter below this share of the deviations is that of copied rows.
 const COPIED: f64 = 1e-9;
 
@@ -69,29 +72,20 @@ pub(crate) fn of_repeats(
     // The drift's functions, orthonormal.
     let mut basis: Vec<DVector<f64>> = Vec::new();
     for column in fields..fields + orders {
-        let mut left: DVector<f64> = all.column(column).into_owned();
-        let whole = left.norm();
-        for known in &basis {
-            let share = known.dot(&left);
-            left.axpy(-share, known, 1.0);
-        }
-        if left.norm() > 1e-6 * whole.max(1e-12) && whole > 1e-9 {
-            let size = left.norm();
-            basis.push(left / size);
-        }
+        basis.extend(outside(all.column(column).into_owned(), &basis));
     }
+    let left = |field: usize, basis: &[DVector<f64>]| without(all.column(field).into_owned(), basis);
+    let before: Vec<DVector<f64>> = (0..fields).map(|field| left(field, &basis)).collect();
+    let sizes: Vec<usize> = members.iter().map(Vec::len).collect();
+    let times: Vec<f64> = rows.iter().map(|row| time[*row]).collect();
+    basis.extend(step(&before, &sizes, &times, &basis, free));
     let dof = free.saturating_sub(basis.len());
     if dof < FEWEST[0] {
         return Noise::Unknown;
     }
     let mut squares = vec![0.0; fields];
     for (field, squares) in squares.iter_mut().enumerate() {
-        let mut left: DVector<f64> = all.column(field).into_owned();
-        for known in &basis {
-            let share = known.dot(&left);
-            left.axpy(-share, known, 1.0);
-        }
-        *squares = left.norm_squared();
+        *squares = left(field, &basis).norm_squared();
     }
     let size: f64 = readings_um.iter().flatten().filter(|value| value.is_finite()).map(|value| value * value).sum();
     let copied = |squares: f64| squares <= COPIED * COPIED * size;
@@ -110,4 +104,61 @@ pub(crate) fn of_repeats(
         std_um[*axis] = (pooled.iter().sum::<f64>() / (pooled.len() * dof) as f64).sqrt();
     }
     Noise::Repeats { std_um, dof }
+}
+
+fn without(mut column: DVector<f64>, basis: &[DVector<f64>]) -> DVector<f64> {
+    for known in basis {
+        let share = known.dot(&column);
+        column.axpy(-share, known, 1.0);
+    }
+    column
+}
+
+/// The direction of a column outside a basis, if any.
+fn outside(column: DVector<f64>, basis: &[DVector<f64>]) -> Option<DVector<f64>> {
+    let whole = column.norm();
+    let left = without(column, basis);
+    let size = left.norm();
+    (size > 1e-6 * whole.max(1e-12) && whole > 1e-9).then(|| left / size)
+}
+
+/// A step of all components in time, beside a drift that is taken out: its direction, where noise does not do as much. Readings are of places
+/// of so many readings each, at times.
+fn step(
+    left: &[DVector<f64>],
+    sizes: &[usize],
+    times: &[f64],
+    basis: &[DVector<f64>],
+    free: usize,
+) -> Option<DVector<f64>> {
+    let mut sorted = times.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let gaps: Vec<f64> =
+        sorted.windows(2).filter(|pair| pair[1] > pair[0]).map(|pair| f64::midpoint(pair[0], pair[1])).collect();
+    let at = |from: f64| {
+        let mut column =
+            DVector::from_iterator(times.len(), times.iter().map(|time| f64::from(u8::from(*time > from))));
+        let mut first = 0;
+        for size in sizes {
+            let mut own = column.rows_mut(first, *size);
+            let mean = own.mean();
+            own.add_scalar_mut(-mean);
+            first += size;
+        }
+        let direction = outside(column, basis)?;
+        let taken: f64 = left.iter().map(|left| left.dot(&direction).powi(2)).sum();
+        Some((taken, from, direction))
+    };
+    let best = |gaps: &[f64], every: usize| {
+        gaps.iter().step_by(every).filter_map(|from| at(*from)).max_by(|one, other| one.0.total_cmp(&other.0))
+    };
+    let every = gaps.len().div_ceil(STEPS).max(1);
+    let start = best(&gaps, every)?.1;
+    let place = gaps.partition_point(|gap| *gap < start);
+    let (taken, _, direction) = best(&gaps[place.saturating_sub(every)..(place + every).min(gaps.len())], 1)?;
+    let whole: f64 = left.iter().map(DVector::norm_squared).sum();
+    let fields = left.len() as f64;
+    let dof = fields * free.checked_sub(basis.len() + 2)? as f64;
+    let chance = f_tail(taken / fields / ((whole - taken) / dof), fields, dof);
+    (chance * (gaps.len() as f64) < STEP_CHANCE).then_some(direction)
 }

@@ -6,7 +6,7 @@
 mod field;
 mod scenario;
 
-use nalgebra::{Isometry3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Point3, Rotation2, Rotation3, Translation3, UnitQuaternion, Vector2, Vector3};
 use rand::{RngExt, SeedableRng, seq::SliceRandom};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
@@ -70,14 +70,32 @@ impl Scenario {
                 let share = row as f64 / (total.max(2) - 1) as f64;
                 let command = places[place];
                 let noise = Vector3::from_fn(|_, _| random.sample::<f64, _>(StandardNormal));
-                let read = machine.read(command) + machine.drift(share) + self.tracker.noise(command, noise);
+                let read = machine.read(command)
+                    + machine.drift(share)
+                    + self.moved(share)
+                    + self.tracker.noise(command, noise);
                 made.readings_um.push((read + self.bad(row)).into());
                 made.commands_mm.push(command);
                 made.time_s.push(self.seconds_per_point * row as f64);
                 made.repeat.push((pass + 1) as f64);
             }
         }
+        self.swap(&mut made.readings_um);
         made
+    }
+
+    /// Exchanges readings of passes, which have equal lengths.
+    fn swap(&self, readings_um: &mut [[f64; 3]]) {
+        let length = readings_um.len() / self.passes.max(1);
+        for effect in &self.effect {
+            let SimulatedEffect::PassSwapped { passes: [one, other] } = effect else { continue };
+            let first = |pass: &usize| pass.saturating_sub(1).min(self.passes - 1) * length;
+            if one == other {
+                readings_um[first(one)..first(one) + length].reverse();
+            } else {
+                (0..length).for_each(|row| readings_um.swap(first(one) + row, first(other) + row));
+            }
+        }
     }
 
     /// Places of a pass, in the order of measurement.
@@ -101,6 +119,15 @@ impl Scenario {
                 (0..count).map(|_| place()).collect()
             }
         }
+    }
+
+    /// Where the tracker is, at a share of the campaign, beside where it was at first, seen from it.
+    fn moved(&self, share: f64) -> Vector3<f64> {
+        let of = |effect: &SimulatedEffect| match effect {
+            SimulatedEffect::TrackerStep { at, by_um } if share > *at => Vector3::from(*by_um),
+            _ => Vector3::zeros(),
+        };
+        self.effect.iter().map(of).sum()
     }
 
     fn bad(&self, row: usize) -> Vector3<f64> {
@@ -154,7 +181,8 @@ impl Machine {
         for letter in self.scenario.chain_letters() {
             let axis = LETTERS.iter().position(|known| *known == letter).unwrap_or(0);
             let unit = if half[axis] > 0.0 { offset[axis] / half[axis] } else { 0.0 };
-            let [displaced, rotated] = self.of_axis(axis, unit);
+            let [mut displaced, rotated] = self.of_axis(axis, unit);
+            displaced[axis] += self.of_screw(axis, command[axis]);
             let along = self.direction(axis) * offset[axis];
             let body = Isometry3::from_parts(
                 Translation3::from(along + 1e-3 * displaced),
@@ -218,6 +246,20 @@ impl Machine {
             }
         }
         [displaced, rotated]
+    }
+
+    /// How far an eccentric screw is ahead at a command, in µm: the height of a pin that turns with it.
+    fn of_screw(&self, axis: usize, command_mm: f64) -> f64 {
+        let of = |effect: &SimulatedEffect| match effect {
+            SimulatedEffect::AxisPitch { targets: [target], period_mm, amplitude_um, phase_deg }
+                if target.starts_with(LETTERS[axis]) =>
+            {
+                let turned = Rotation2::new(command_mm / period_mm * std::f64::consts::TAU + phase_deg.to_radians());
+                (turned * Vector2::new(*amplitude_um, 0.0)).y
+            }
+            _ => 0.0,
+        };
+        self.scenario.effect.iter().map(of).sum()
     }
 
     fn jump(&self, command: [f64; 3]) -> Vector3<f64> {

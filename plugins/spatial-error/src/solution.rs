@@ -219,6 +219,12 @@ impl Solution {
         all
     }
 
+    /// Place of a column in the trend; `None` where the readings do not determine it.
+    #[must_use]
+    pub(crate) fn column(&self, wanted: Term) -> Option<usize> {
+        self.terms.iter().position(|term| *term == wanted)
+    }
+
     /// What each field has, by axis; `lost` of a component that was not measured.
     #[must_use]
     pub(crate) fn by_axis<T: Copy>(&self, fields: impl IntoIterator<Item = T>, lost: T) -> [T; 3] {

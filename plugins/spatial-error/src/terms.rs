@@ -34,6 +34,12 @@ pub enum Term {
     Drift(usize),
     /// Bend of a drift: its course at half time less half its change, µm.
     Bend(usize),
+    /// Sine or cosine of an axis' place, from the middle of the volume, over a period, µm.
+    Pitch { axis: usize, period_mm: f64, cosine: bool },
+    /// What a sine and a cosine, in µm, gain as their period grows, of the relative change of the period.
+    PitchSlope { axis: usize, period_mm: f64, sine_um: f64, cosine_um: f64 },
+    /// Displacement along `moved` from a time on, µm.
+    After { moved: usize, time: f64 },
     /// Displacement along `moved` on one side of a plane, µm.
     Step { moved: usize, axis: usize, at_mm: f64 },
     /// Displacement along `moved` within a box at a corner, µm; `above` says at which end of each axis.
@@ -85,6 +91,15 @@ impl Term {
             }
             Self::Drift(axis) => adds[axis] = time,
             Self::Bend(axis) => adds[axis] = 4.0 * time * (1.0 - time),
+            Self::Pitch { axis, period_mm, cosine } => {
+                let turn = std::f64::consts::TAU * from_middle(axis) / period_mm;
+                adds[axis] = if cosine { turn.cos() } else { turn.sin() };
+            }
+            Self::PitchSlope { axis, period_mm, sine_um, cosine_um } => {
+                let turn = std::f64::consts::TAU * from_middle(axis) / period_mm;
+                adds[axis] = turn * (cosine_um * turn.sin() - sine_um * turn.cos());
+            }
+            Self::After { moved, time: from } => adds[moved] = f64::from(u8::from(time > from)),
             Self::Step { moved, axis, at_mm } => adds[moved] = f64::from(u8::from(place[axis] > at_mm)),
             Self::Corner { moved, limit_mm, above } => {
                 let inside = (0..3).all(|axis| (place[axis] > limit_mm[axis]) == above[axis]);
@@ -97,7 +112,18 @@ impl Term {
     /// Whether it depends on time.
     #[must_use]
     pub fn moves_in_time(self) -> bool {
-        matches!(self, Self::Drift(_) | Self::Bend(_))
+        matches!(self, Self::Drift(_) | Self::Bend(_) | Self::After { .. })
+    }
+
+    /// Whether it is the change of a sine or cosine with its period.
+    #[must_use]
+    pub fn is_slope_of(self, other: Self) -> bool {
+        match (self, other) {
+            (Self::PitchSlope { axis, period_mm, .. }, Self::Pitch { axis: of, period_mm: period, .. }) => {
+                axis == of && period_mm.to_bits() == period.to_bits()
+            }
+            _ => false,
+        }
     }
 
     /// Its unit.
@@ -106,6 +132,7 @@ impl Term {
         match self {
             Self::Turn(_) | Self::Squareness(..) | Self::Angular { .. } => "urad",
             Self::Scale(_) => "um/m",
+            Self::PitchSlope { .. } => "1",
             _ => "um",
         }
     }

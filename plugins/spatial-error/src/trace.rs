@@ -3,7 +3,6 @@
 //! A covariance that was estimated without an effect has taken a part of it for field. Evidence with this covariance held would be
 //! wrong by any amount, so it only lists what is tried.
 
-use nalgebra::{Cholesky, DMatrix, DVector};
 use runout_core::numerics::statistics::f_tail;
 
 use crate::{
@@ -13,6 +12,8 @@ use crate::{
     families::{Likely, most_likely},
     joint::Data,
     likelihood::{Criterion, Estimate, Prior, estimate},
+    searched::{Sums, aliases},
+    shapes::Shape,
     solve::{estimated_from, independent},
     terms::Term,
 };
@@ -24,15 +25,14 @@ const BIC_LIMIT: f64 = -10.0;
 /// Effects and jumps that are tried in each round.
 const TRIED: [usize; 2] = [8, 4];
 /// Candidates whose criteria differ by less are not distinguished, where one leaves nothing for the other.
-const SAME_BIC: f64 = 10.0;
+pub(crate) const SAME_BIC: f64 = 10.0;
 /// Share of its gain that is left of a candidate beside another one with which it is confounded, at most.
 const LEFT: f64 = 0.15;
-/// Jumps that are listed at once.
-const AT_ONCE: usize = 40;
+/// What is said of a jump that a step of the tracker explains as well.
+const IN_TIME_OR_SPACE: &str =
+    "or the tracker moved at that time: readings in another order of the places distinguish them";
 /// Jumps at most.
 const MOST_JUMPS: usize = 4;
-/// What a column adds beside others, as a share of its own square, to be more than rounding.
-const OWN: f64 = 1e-9;
 
 /// Evidence for columns.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -52,8 +52,17 @@ pub(crate) struct Found {
     pub members: Vec<usize>,
     /// Whether it is a jump.
     pub jump: bool,
+    /// Why it is not added, though the readings ask for it.
+    pub undecided: Option<String>,
     /// Its evidence when it was found.
     pub gain: Gain,
+}
+
+impl Found {
+    /// Whether it is added to the model.
+    pub(crate) fn is_added(&self) -> bool {
+        !self.jump && self.undecided.is_none()
+    }
 }
 
 /// A refusal.
@@ -67,8 +76,9 @@ pub(crate) struct Doubt {
 
 /// The search.
 pub(crate) struct Tracing<'a> {
-    campaign: &'a Campaign,
-    candidates: &'a [Candidate],
+    pub campaign: &'a Campaign,
+    /// Those that were given, and behind them those whose shape was refined.
+    pub candidates: Vec<Candidate>,
     jumps: &'a [Jump],
     declared: Vec<Term>,
     some: Option<Vec<usize>>,
@@ -76,19 +86,19 @@ pub(crate) struct Tracing<'a> {
     families: &'a [Family],
     /// Covariances that are given, and not estimated.
     fixed: bool,
-    /// Candidates that may be added.
-    allowed: Vec<bool>,
+    /// Whether each that was given may be added.
+    pub allowed: Vec<bool>,
     /// What was refused last.
     pub doubts: Vec<Doubt>,
 }
 
 /// A state of the search.
 #[derive(Clone)]
-struct State {
-    found: Vec<Found>,
+pub(crate) struct State {
+    pub found: Vec<Found>,
     /// Of each component.
     families: Vec<Family>,
-    estimate: Estimate,
+    pub estimate: Estimate,
 }
 
 impl<'a> Tracing<'a> {
@@ -97,7 +107,7 @@ impl<'a> Tracing<'a> {
     pub(crate) fn new(
         campaign: &'a Campaign,
         declared: Vec<Term>,
-        candidates: &'a [Candidate],
+        candidates: Vec<Candidate>,
         jumps: &'a [Jump],
         families: &'a [Family],
         given: Option<&Prior>,
@@ -121,12 +131,15 @@ impl<'a> Tracing<'a> {
         // A jump may stand for several effects that no single one of them betrays.
         let effects = self.follow(start, most, false);
         let total = |state: &State| {
-            let parameters: usize = state.found.iter().map(|found| self.terms_of(found).len()).sum();
+            let parameters: usize = state.found.iter().map(|found| self.parameters(found.members[0], found.jump)).sum();
             parameters as f64 * self.count().ln() - 2.0 * state.estimate.ln_likelihood
         };
         // An unknown place counts as three more numbers each.
         let jumps = with_jumps.found.iter().filter(|found| found.jump).count() as f64;
         let better = total(&with_jumps) + 3.0 * jumps * self.count().ln() < total(&effects);
+        let is_step = |found: &Found| matches!(self.candidates[found.members[0]].shape, Shape::From(_));
+        let same = with_jumps.found.iter().any(|found| found.jump && found.undecided.is_some());
+        let better = better || (same && effects.found.iter().any(is_step));
         Some(if better { with_jumps.found } else { effects.found })
     }
 
@@ -137,11 +150,10 @@ impl<'a> Tracing<'a> {
     }
 
     fn terms_of(&self, found: &Found) -> &[Term] {
-        let first = found.members[0];
-        if found.jump { &self.jumps[first].terms } else { &self.candidates[first].terms }
+        self.columns(found.members[0], found.jump)
     }
 
-    fn terms(&self, found: &[Found]) -> Vec<Term> {
+    pub(crate) fn terms(&self, found: &[Found]) -> Vec<Term> {
         self.declared
             .iter()
             .copied()
@@ -149,7 +161,7 @@ impl<'a> Tracing<'a> {
             .collect()
     }
 
-    fn data(&self, terms: &[Term]) -> Data {
+    pub(crate) fn data(&self, terms: &[Term]) -> Data {
         self.campaign.data(terms, self.some.as_deref())
     }
 
@@ -202,38 +214,41 @@ impl<'a> Tracing<'a> {
         let used = |index: &usize, jump: bool| {
             state.found.iter().any(|found| found.jump == jump && found.members.contains(index))
         };
-        let own: Vec<usize> =
-            (0..self.candidates.len()).filter(|index| effects && self.allowed[*index] && !used(index, false)).collect();
+        let own: Vec<usize> = (0..self.allowed.len())
+            .filter(|index| effects && self.allowed[*index] && !self.is_searched(*index) && !used(index, false))
+            .collect();
         let fewer = state.found.iter().filter(|found| found.jump).count() < MOST_JUMPS;
         let steps: Vec<usize> = (0..self.jumps.len()).filter(|index| jumps && fewer && !used(index, true)).collect();
-        let sums = Sums::of(self, state, &own, false);
-        let effects_by_gain = own.iter().filter_map(|index| Some((*index, sums.gain(*index)?))).collect();
-        // Products of all jumps with each other are not needed.
-        let of_jumps = steps.chunks(AT_ONCE).flat_map(|some| {
-            let sums = Sums::of(self, state, some, true);
-            some.iter().filter_map(|index| Some((*index, sums.gain(*index)?))).collect::<Vec<_>>()
-        });
-        let jumps_by_gain: Vec<(usize, f64)> = of_jumps.collect();
+        let (searched, total) = if effects { self.best_of_searched(state) } else { (Vec::new(), 0) };
+        let refined = self.candidates.len()..self.candidates.len() + searched.len();
+        let alike: Vec<Vec<f64>> = searched.iter().map(|one| one.alike_mm.clone()).collect();
+        self.candidates.extend(searched.into_iter().map(|one| one.candidate));
+        let by_gain = |all: &[usize], jump: bool| {
+            let gains = self.gains(state, all.iter().map(|index| self.columns(*index, jump)));
+            all.iter().zip(gains).filter_map(|(index, gain)| Some((*index, gain?))).collect::<Vec<(usize, f64)>>()
+        };
         let list = |mut ranked: Vec<(usize, f64)>, most: usize| {
             ranked.sort_by(|a, b| b.1.total_cmp(&a.1));
             ranked.truncate(most);
             ranked
         };
         let mut trials: Vec<(bool, usize, Gain, Estimate)> = Vec::new();
-        for (jump, total, ranked, most) in
-            [(false, own.len(), effects_by_gain, TRIED[0]), (true, steps.len(), jumps_by_gain, TRIED[1])]
-        {
-            for (index, _) in list(ranked, most) {
-                let added = if jump { &self.jumps[index].terms } else { &self.candidates[index].terms };
+        for (jump, total, ranked) in [
+            (false, own.len(), list(by_gain(&own, false), TRIED[0])),
+            (false, total, refined.clone().map(|index| (index, 0.0)).collect()),
+            (true, steps.len(), list(by_gain(&steps, true), TRIED[1])),
+        ] {
+            for (index, _) in ranked {
+                let added = self.columns(index, jump);
                 let terms: Vec<Term> = self.terms(&state.found).into_iter().chain(added.iter().copied()).collect();
                 let Some(estimate) = self.refit(&terms, state) else { continue };
                 let likelihood = 2.0 * (estimate.ln_likelihood - state.estimate.ln_likelihood);
-                let gain = self.gain(likelihood, added.len(), total);
+                let gain = self.gain(likelihood, self.parameters(index, jump), total);
                 trials.push((jump, index, gain, estimate));
             }
         }
         trials.sort_by(|a, b| a.2.bic.total_cmp(&b.2.bic));
-        let (jump, index, gain, estimate) = trials.first()?.clone();
+        let (mut jump, mut index, mut gain, mut estimate) = trials.first()?.clone();
         if gain.p > P_LIMIT || gain.bic > BIC_LIMIT {
             if let Some((_, candidate, gain, _)) = trials.iter().find(|trial| !trial.0).filter(|_| effects) {
                 let reason = format!(
@@ -244,14 +259,45 @@ impl<'a> Tracing<'a> {
             }
             return None;
         }
+        let mut undecided =
+            (!jump && refined.contains(&index)).then(|| aliases(&alike[index - refined.start])).flatten();
+        // In one pass over the places, a step in time may be one in space.
+        let is_step = |trial: &(bool, usize, Gain, Estimate)| {
+            !trial.0 && matches!(self.candidates[trial.1].shape, Shape::From(_))
+        };
+        let near = |trial: &&(bool, usize, Gain, Estimate)| trial.2.bic - gain.bic < SAME_BIC;
+        let of_space = trials.iter().filter(near).find(|trial| trial.0);
+        if let Some(of_space) = of_space.filter(|_| jump || is_step(&trials[0]))
+            && trials.iter().filter(near).any(is_step)
+        {
+            undecided = Some(IN_TIME_OR_SPACE.into());
+            (jump, index, gain, estimate) = of_space.clone();
+        }
         let mut members = vec![index];
         if !jump {
-            let alike = trials.iter().skip(1).filter(|trial| !trial.0 && trial.2.bic - gain.bic < SAME_BIC);
-            members.extend(alike.filter(|trial| sums.left(trial.1, index) < LEFT).map(|trial| trial.1));
+            let own = self.candidates[index].effect;
+            let alike = trials.iter().filter(|trial| {
+                !trial.0 && self.candidates[trial.1].effect != own && trial.2.bic - gain.bic < SAME_BIC
+            });
+            let left = |other: usize| Sums::of(self, state, [self.columns(other, false), self.columns(index, false)]);
+            members.extend(alike.map(|trial| trial.1).filter(|other| left(*other).left(0, 1) < LEFT));
         }
         let mut found = state.found.clone();
-        found.push(Found { members, jump, gain });
+        found.push(Found { members, jump, undecided, gain });
         Some(State { found, families: state.families.clone(), estimate })
+    }
+
+    pub(crate) fn is_searched(&self, candidate: usize) -> bool {
+        self.candidates[candidate].shape.is_searched()
+    }
+
+    pub(crate) fn columns(&self, index: usize, jump: bool) -> &[Term] {
+        if jump { &self.jumps[index].terms } else { &self.candidates[index].terms }
+    }
+
+    /// Numbers that are estimated of a candidate: a shape that was looked for is one.
+    fn parameters(&self, index: usize, jump: bool) -> usize {
+        self.columns(index, jump).len() + usize::from(!jump && self.is_searched(index))
     }
 
     /// The state without what is explained by what was found after it.
@@ -265,78 +311,12 @@ impl<'a> Tracing<'a> {
             let Some(estimate) = self.refit(&self.terms(&found), state) else { continue };
             let likelihood = 2.0 * (state.estimate.ln_likelihood - estimate.ln_likelihood);
             let total = if removed.jump { self.jumps.len() } else { self.candidates.len() };
-            let gain = self.gain(likelihood, self.terms_of(&removed).len(), total);
+            let gain = self.gain(likelihood, self.parameters(removed.members[0], removed.jump), total);
             if gain.p > P_LIMIT || gain.bic > BIC_LIMIT {
                 return Some(State { found, families: state.families.clone(), estimate });
             }
         }
         None
-    }
-}
-
-/// Normal equations of all candidates beside what is fitted, with the covariance held: what each would gain to first order.
-struct Sums {
-    /// The columns of each.
-    places: Vec<(usize, std::ops::Range<usize>)>,
-    /// Products of the columns outside the span of what is fitted.
-    normal: DMatrix<f64>,
-    right: DVector<f64>,
-    whole: DVector<f64>,
-}
-
-impl Sums {
-    fn of(tracing: &Tracing, state: &State, all: &[usize], jump: bool) -> Self {
-        let base = tracing.terms(&state.found);
-        let mut terms = base.clone();
-        let mut places = Vec::new();
-        for index in all {
-            let added = if jump { &tracing.jumps[*index].terms } else { &tracing.candidates[*index].terms };
-            places.push((*index, terms.len() - base.len()..terms.len() - base.len() + added.len()));
-            terms.extend(added);
-        }
-        let (normal, right) = state.estimate.joint.equations(&tracing.data(&terms));
-        let (fitted, count) = (base.len(), terms.len() - base.len());
-        let corner = normal.view((fitted, fitted), (count, count)).into_owned();
-        let whole = corner.diagonal();
-        let (mut outside, mut left) = (corner, right.rows(fitted, count).into_owned());
-        if fitted > 0 {
-            let across = normal.view((0, fitted), (fitted, count)).into_owned();
-            let solved = &state.estimate.joint.trend_covariance * &across;
-            outside -= across.transpose() * &solved;
-            left -= solved.transpose() * right.rows(0, fitted);
-        }
-        Self { places, normal: outside, right: left, whole }
-    }
-
-    fn range(&self, index: usize) -> Option<std::ops::Range<usize>> {
-        self.places.iter().find(|(known, _)| *known == index).map(|(_, range)| range.clone())
-    }
-
-    /// What columns gain beside others; `None` where they are in the span of what is fitted.
-    fn quadratic(&self, columns: &[usize]) -> Option<f64> {
-        let count = columns.len();
-        let normal = DMatrix::from_fn(count, count, |row, column| self.normal[(columns[row], columns[column])]);
-        if (0..count).any(|row| normal[(row, row)] <= OWN * self.whole[columns[row]]) {
-            return None;
-        }
-        let right = DVector::from_fn(count, |row, _| self.right[columns[row]]);
-        Some(Cholesky::new(normal)?.solve(&right).dot(&right))
-    }
-
-    fn gain(&self, index: usize) -> Option<f64> {
-        self.quadratic(&self.range(index)?.collect::<Vec<_>>())
-    }
-
-    /// Share of a candidate's gain that another one leaves.
-    fn left(&self, index: usize, other: usize) -> f64 {
-        let (Some(own), Some(others)) = (self.range(index), self.range(other)) else { return 1.0 };
-        let both: Vec<usize> = others.clone().chain(own.clone()).collect();
-        let alone = self.quadratic(&own.collect::<Vec<_>>());
-        // Columns that are the same leave nothing.
-        match (self.quadratic(&both), self.quadratic(&others.collect::<Vec<_>>()), alone) {
-            (Some(both), Some(others), Some(alone)) if alone > 0.0 => (both - others).max(0.0) / alone,
-            _ => 0.0,
-        }
     }
 }
 

@@ -1,6 +1,15 @@
 //! Mistakes of a file of points or of its declaration: columns that are exchanged or have the other sign, angles that count the other way.
 
+use runout_consistency::{Check, Test};
+
 use super::{Column, Points};
+
+/// Share of the scatter of repeats that is left where the readings of a pass are put right, below which they stand at wrong places; and how
+/// much more others may leave that are named beside.
+const SHARE: f64 = 0.04;
+const ALIKE: f64 = 2.0;
+/// Passes up to which all pairs are tried.
+const MOST_PASSES: usize = 30;
 
 /// The points with two columns exchanged, with columns negated, and with two exchanged of which one is negated (turned by 90°), each with what
 /// is wrong in words. Columns that the points lack are left out.
@@ -60,6 +69,72 @@ pub fn likeliest(declared: f64, limit: f64, corrected: impl Iterator<Item = (Str
         .then(|| format!("it looks as if {what}: corrected for it, the fit would leave {times:.1} times less"))
 }
 
+/// A pass with the readings of another one, or with its own in reverse order, `pass-swapped`: readings of one place then agree far better if
+/// they are put right. `place` is that of each row, `passes` are the rows of each pass in the order of the file, with its name; offsets of
+/// passes do not count. Two passes that are each other's reverse are exchanged unseen: all their readings are at mirrored places. `None` where
+/// no place is in two passes.
+#[must_use]
+pub fn passes(place: &[usize], passes: &[(String, Vec<usize>)], readings: &[[f64; 3]]) -> Option<Check> {
+    if !(2..=MOST_PASSES).contains(&passes.len()) {
+        return None;
+    }
+    let declared: Vec<usize> = (0..readings.len()).collect();
+    let reversed = passes.iter().map(|(name, rows)| {
+        let mut order = declared.clone();
+        rows.iter().zip(rows.iter().rev()).for_each(|(row, other)| order[*row] = *other);
+        (format!("the readings of {name} are in reverse order"), order)
+    });
+    let pairs =
+        passes.iter().enumerate().flat_map(|(index, one)| passes[..index].iter().map(move |other| (other, one)));
+    let exchanged = pairs.filter(|(one, other)| one.1.len() == other.1.len()).map(|((one, rows), (other, others))| {
+        let mut order = declared.clone();
+        rows.iter().zip(others).for_each(|(row, other)| (order[*row], order[*other]) = (*other, *row));
+        (format!("the readings of {one} and {other} are exchanged"), order)
+    });
+    let (before, freedom) = scatter(place, passes, readings, &declared);
+    let mut tried: Vec<(String, f64)> =
+        reversed.chain(exchanged).map(|(what, order)| (what, scatter(place, passes, readings, &order).0)).collect();
+    tried.sort_by(|one, other| one.1.total_cmp(&other.1));
+    let share = tried.first()?.1 / before;
+    if freedom < 1.0 || !share.is_finite() {
+        return None;
+    }
+    let alike: Vec<&str> =
+        tried.iter().filter(|one| one.1 <= ALIKE * tried[0].1).map(|(what, _)| what.as_str()).collect();
+    let p = if share < SHARE { 0.0 } else { 1.0 };
+    Some(Check::new(Test::Repeats, "order of the passes", share, &[freedom, freedom], p).finding(|| {
+        format!(
+            "it looks as if {}: put right, readings of one place would scatter {:.1} times less",
+            alike.join(", or "),
+            share.sqrt().recip()
+        )
+    }))
+}
+
+/// Squares of readings less the means of their passes and places, and their number less that of the means. `order` has the row whose reading
+/// each row gets.
+fn scatter(place: &[usize], passes: &[(String, Vec<usize>)], readings: &[[f64; 3]], order: &[usize]) -> (f64, f64) {
+    let places = place.iter().max().map_or(0, |last| last + 1);
+    let (mut squares, mut freedom) = (0.0, 0.0);
+    for component in 0..3 {
+        let mut left: Vec<f64> = order.iter().map(|row| readings[*row][component]).collect();
+        for (_, rows) in passes {
+            let mean = rows.iter().map(|row| left[*row]).sum::<f64>() / rows.len() as f64;
+            rows.iter().for_each(|row| left[*row] -= mean);
+        }
+        let mut of_place = vec![(0.0, 0.0, 0.0); places];
+        for (left, place) in left.iter().zip(place).filter(|(left, _)| left.is_finite()) {
+            let (count, sum, square) = &mut of_place[*place];
+            (*count, *sum, *square) = (*count + 1.0, *sum + left, *square + left * left);
+        }
+        for (count, sum, square) in of_place.into_iter().filter(|(count, ..)| *count > 1.0) {
+            squares += square - sum * sum / count;
+            freedom += count - 1.0;
+        }
+    }
+    (squares, freedom)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -86,6 +161,34 @@ mod tests {
                 ("`dx_mm` and `dy_mm` are exchanged, `dy_mm` with the other sign", 2.0, -1.0),
             ]
         );
+    }
+
+    /// Passes over 12 places, the second one in an order of its own, and what is read at each place.
+    fn two_passes() -> (Vec<usize>, Vec<(String, Vec<usize>)>, Vec<[f64; 3]>) {
+        let place: Vec<usize> = (0..12).chain((0..12).map(|row| row * 5 % 12)).collect();
+        let read = |(row, place): (usize, &usize)| {
+            let x = *place as f64;
+            [x.sin() * 8.0 + 0.1 * (row as f64).cos(), x * x - 7.0 * x, f64::NAN]
+        };
+        let readings = place.iter().enumerate().map(read).collect();
+        let passes = vec![("pass 1".to_owned(), (0..12).collect()), ("pass 2".to_owned(), (12..24).collect())];
+        (place, passes, readings)
+    }
+
+    #[test]
+    fn readings_of_passes_that_stand_at_wrong_places_are_named() {
+        let (place, runs, sound) = two_passes();
+        assert!(passes(&place, &runs, &sound).is_some_and(|check| check.finding.is_empty()));
+        let exchanged: Vec<[f64; 3]> = sound[12..].iter().chain(&sound[..12]).copied().collect();
+        let found = passes(&place, &runs, &exchanged).unwrap();
+        assert!(found.refutes() && found.finding.contains("pass 1 and pass 2 are exchanged"), "{}", found.finding);
+        let reversed: Vec<[f64; 3]> = sound[..12].iter().chain(sound[12..].iter().rev()).copied().collect();
+        let found = passes(&place, &runs, &reversed).unwrap();
+        assert!(found.finding.contains("pass 2 are in reverse order"), "{}", found.finding);
+        // One pass, and passes that share no place, say nothing.
+        assert!(passes(&place[..12], &runs[..1], &sound[..12]).is_none());
+        let apart: Vec<usize> = (0..24).collect();
+        assert!(passes(&apart, &runs, &sound).is_none());
     }
 
     #[test]

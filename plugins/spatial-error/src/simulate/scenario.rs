@@ -153,6 +153,30 @@ pub enum SimulatedEffect {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         time_constant: Option<f64>,
     },
+    /// The screw of X, Y or Z is eccentric, or its scale has a period.
+    AxisPitch {
+        /// The axis.
+        targets: [String; 1],
+        /// In mm.
+        period_mm: f64,
+        /// In µm.
+        amplitude_um: f64,
+        /// Where the axis is at 0 mm.
+        #[serde(default)]
+        phase_deg: f64,
+    },
+    /// The tracker or the datum of the machine is displaced from a time on.
+    TrackerStep {
+        /// Share of the campaign before it.
+        at: f64,
+        /// By which later readings are displaced, in µm.
+        by_um: [f64; 3],
+    },
+    /// The readings of two passes are exchanged in the file, row by row; of one, given twice, they are in reverse order: a mistake of the file.
+    PassSwapped {
+        /// Numbers of the passes, from 1.
+        passes: [usize; 2],
+    },
     /// A step across a plane: no effect of the closed loop.
     Step {
         /// X, Y or Z, across which the plane is.
@@ -275,7 +299,10 @@ impl Scenario {
 impl SimulatedEffect {
     fn check(&self) -> std::result::Result<(), Fault> {
         let (key, target, known): (&str, &str, &[&str]) = match self {
-            Self::Scale { targets, .. } => ("targets", &targets[0], &["X", "Y", "Z"]),
+            Self::AxisPitch { period_mm, .. } if !(period_mm.is_finite() && *period_mm > 0.0) => {
+                return Err(Fault::at("period_mm", format!("expected a period above 0 mm, found {period_mm}")));
+            }
+            Self::Scale { targets, .. } | Self::AxisPitch { targets, .. } => ("targets", &targets[0], &["X", "Y", "Z"]),
             Self::Squareness { targets, .. } => ("targets", &targets[0], &["XY", "XZ", "YZ"]),
             Self::Positioning { targets, .. } => ("targets", &targets[0], &["EXX", "EYY", "EZZ"]),
             Self::Straightness { targets, .. } => ("targets", &targets[0], &["EYX", "EZX", "EXY", "EZY", "EXZ", "EYZ"]),
@@ -284,7 +311,10 @@ impl SimulatedEffect {
             }
             Self::ThermalDrift { targets, .. } => ("targets", &targets[0], &["x", "y", "z"]),
             Self::Step { axis, .. } => ("axis", axis, &["X", "Y", "Z"]),
-            Self::DisplacedBox { .. } | Self::BadReading { .. } => return Ok(()),
+            Self::TrackerStep { .. }
+            | Self::PassSwapped { .. }
+            | Self::DisplacedBox { .. }
+            | Self::BadReading { .. } => return Ok(()),
         };
         if known.contains(&target) {
             return Ok(());

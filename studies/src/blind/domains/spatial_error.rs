@@ -21,8 +21,9 @@ use crate::{
 /// Readings of a tracker over the travel.
 pub(crate) const DOMAIN: Domain = Domain { name: "spatial-error", draw };
 
-const EFFECTS: [&str; 6] = ["scale", "squareness", "positioning", "straightness", "angular", "thermal-drift"];
-const STRANGERS: [&str; 2] = ["step", "displaced-box"];
+const EFFECTS: [&str; 8] =
+    ["scale", "squareness", "positioning", "straightness", "angular", "thermal-drift", "axis-pitch", "tracker-step"];
+const STRANGERS: [&str; 3] = ["step", "displaced-box", "pass-swapped"];
 /// χ², by the true covariance, from which something shows beside the field.
 const VISIBLE: f64 = 60.0;
 /// Coarse: predictions are not judged here.
@@ -47,8 +48,10 @@ fn draw(kind: Kind, turn: usize, chance: &mut Chance) -> Result<Campaign> {
         planted.visible = Some(visibility(&scenario, index, &known, made.time_s.len()) > VISIBLE);
     }
     let is_grid = matches!(scenario.layout, Layout::Grid { .. });
-    let config =
-        SpatialErrorConfig { query: Query { grid_mm: Some(GRID_MM), path: None }, ..SpatialErrorConfig::default() };
+    // Few equal distances show no period: there the screw's lead is declared.
+    let pitch_mm = if is_grid { leads(&scenario) } else { [0.0; 3] };
+    let query = Query { grid_mm: Some(GRID_MM), path: None };
+    let config = SpatialErrorConfig { query, pitch_mm, ..SpatialErrorConfig::default() };
     let context = Context { folder: std::path::Path::new("."), rig: None };
     let separator = config.separator(&context).map_err(|fault| Error::new("check", "the kriging", fault))?;
     // The placement counts from the middle of the measured volume, which of scattered places is not that of the travel.
@@ -63,6 +66,16 @@ fn draw(kind: Kind, turn: usize, chance: &mut Chance) -> Result<Campaign> {
     })
 }
 
+fn leads(scenario: &Scenario) -> [f64; 3] {
+    ["X", "Y", "Z"].map(|axis| {
+        let of = |effect: &SimulatedEffect| match effect {
+            SimulatedEffect::AxisPitch { targets: [target], period_mm, .. } if target == axis => Some(*period_mm),
+            _ => None,
+        };
+        scenario.effect.iter().find_map(of).unwrap_or(0.0)
+    })
+}
+
 fn placement(scenario: &Scenario) -> Vec<True> {
     let shifts = ["TX", "TY", "TZ"].into_iter().zip(scenario.placement.shift_um);
     let turns = ["RX", "RY", "RZ"].into_iter().zip(scenario.placement.turn_urad);
@@ -72,10 +85,19 @@ fn placement(scenario: &Scenario) -> Vec<True> {
 
 /// χ² of what one of the effects adds to the readings: beside the field, or, of a drift, in the repeats.
 fn visibility(scenario: &Scenario, index: usize, known: &Known, readings: usize) -> f64 {
-    if let SimulatedEffect::ThermalDrift { drift_um, .. } = &scenario.effect[index] {
-        let noise_um = scenario.tracker.noise_um.hypot(2.0 * scenario.tracker.angle_urad);
-        let passes = scenario.passes as f64;
-        return (drift_um / noise_um).powi(2) / 12.0 * readings as f64 * (1.0 - 1.0 / passes) / 2.0;
+    if let SimulatedEffect::PassSwapped { passes: [one, other] } = &scenario.effect[index] {
+        // Passes in one order hold the same readings.
+        return if one == other || scenario.random_order { f64::INFINITY } else { 0.0 };
+    }
+    let noise_um = scenario.tracker.noise_um.hypot(2.0 * scenario.tracker.angle_urad);
+    let repeated = readings as f64 * (1.0 - 1.0 / scenario.passes as f64) / 2.0;
+    match &scenario.effect[index] {
+        SimulatedEffect::ThermalDrift { drift_um, .. } => return (drift_um / noise_um).powi(2) / 12.0 * repeated,
+        SimulatedEffect::TrackerStep { at, by_um } => {
+            let squares: f64 = by_um.iter().map(|by| (by / noise_um).powi(2)).sum();
+            return squares * at * (1.0 - at) * repeated;
+        }
+        _ => {}
     }
     let quiet = Scenario { field: None, effect: vec![scenario.effect[index].clone()], ..scenario.clone() };
     let without = Scenario { effect: Vec::new(), ..quiet.clone() };
@@ -136,6 +158,29 @@ fn plant(id: &'static str, large: bool, scenario: &mut Scenario, chance: &mut Ch
             let planted = Planted::effect(id, target, format!("{size:.1} µm"), vec![("change", size)]);
             let targets = [target.to_owned()];
             (SimulatedEffect::ThermalDrift { targets, drift_um: size, time_constant: None }, planted)
+        }
+        "axis-pitch" => {
+            let target = chance.one_of(&["X", "Y", "Z"]);
+            let period_mm = chance.size(7.0, 45.0);
+            let mut parameters = vec![("amplitude", size.abs())];
+            parameters.extend((!is_grid).then_some(("period", period_mm)));
+            let mut planted = Planted::effect(id, target, format!("{size:.1} µm, {period_mm:.2} mm"), parameters);
+            planted.names.push(format!("{id} {target} period {period_mm:.2} mm"));
+            let phase_deg = if size < 0.0 { 180.0 } else { 0.0 };
+            let targets = [target.to_owned()];
+            (SimulatedEffect::AxisPitch { targets, period_mm, amplitude_um: size.abs(), phase_deg }, planted)
+        }
+        "pass-swapped" => {
+            let passes = [1, 1 + chance.below(2)];
+            let words = if passes[0] == passes[1] { "pass 1 in reverse order" } else { "passes 1 and 2" };
+            (SimulatedEffect::PassSwapped { passes }, Planted::stranger(id, words.into()))
+        }
+        "tracker-step" => {
+            let at = chance.between(0.1, 0.9);
+            let by_um = [size, size * chance.between(-1.0, 1.0), size * chance.between(-1.0, 1.0)];
+            let parameters = ["step_x", "step_y", "step_z"].into_iter().zip(by_um).collect();
+            let planted = Planted::effect(id, "", format!("by {by_um:.1?} µm at {at:.2}"), parameters);
+            (SimulatedEffect::TrackerStep { at, by_um }, planted)
         }
         _ => {
             let field = scenario.field.as_ref().map_or([0.0; 3], |field| field.std_um);

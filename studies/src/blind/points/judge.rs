@@ -58,6 +58,8 @@ pub struct Valued {
     pub declared: f64,
     /// The same with the final model.
     pub last: f64,
+    /// How much farther from the truth the final model has it, in standard uncertainties of the final model.
+    pub farther: f64,
 }
 
 /// Diagnoses a campaign and compares.
@@ -91,6 +93,7 @@ pub fn judge(index: u64, kind: Kind, campaign: &Campaign) -> Result<Judged> {
         symbol: truth.symbol.clone(),
         declared: ratio(&declared, truth),
         last: ratio(&found.after.values, truth),
+        farther: farther(&declared, &found.after.values, truth),
     });
     Ok(Judged {
         index,
@@ -111,11 +114,21 @@ fn model(campaign: &Campaign) -> Result<&dyn PointModel> {
         .ok_or_else(|| Error::new("diagnose", campaign.layout, "the separator has no model for the closed loop"))
 }
 
-/// Error over standard uncertainty; NaN where either is not known.
-fn ratio(values: &[NamedValue], truth: &True) -> f64 {
+/// A value and its standard uncertainty; NaN where either is not known.
+fn known(values: &[NamedValue], truth: &True) -> [f64; 2] {
     let found = values.iter().find(|value| value.symbol == truth.symbol && value.of == truth.of);
-    let both = found.and_then(|value| value.value.zip(value.std));
-    both.map_or(f64::NAN, |(value, std)| (value - truth.value) / std)
+    found.and_then(|value| value.value.zip(value.std)).map_or([f64::NAN; 2], |(value, std)| [value, std])
+}
+
+/// Error over standard uncertainty.
+fn ratio(values: &[NamedValue], truth: &True) -> f64 {
+    let [value, std] = known(values, truth);
+    (value - truth.value) / std
+}
+
+fn farther(declared: &[NamedValue], last: &[NamedValue], truth: &True) -> f64 {
+    let ([before, _], [after, std]) = (known(declared, truth), known(last, truth));
+    ((after - truth.value).abs() - (before - truth.value).abs()) / std
 }
 
 /// Effect and target as in `confounded_with`.

@@ -8,7 +8,7 @@ use crate::blind::{Kind, judge::VISIBLE_CHI2};
 /// Everything as Markdown.
 #[must_use]
 pub fn report(all: &[Judged]) -> String {
-    [effects(all), clean(all), strangers(all), values(all), failures(all)].join("\n")
+    [effects(all), clean(all), strangers(all), unexplained(all), values(all), failures(all)].join("\n")
 }
 
 fn of(all: &[Judged], kind: Kind) -> Vec<&Judged> {
@@ -127,6 +127,35 @@ fn strangers(all: &[Judged]) -> String {
 }
 
 /// Errors of values over their standard uncertainties.
+/// What ends unexplained, and whether effects that were added all the same moved values away from the truth.
+fn unexplained(all: &[Judged]) -> String {
+    let mut text = String::from(
+        "| ended unexplained | with effects added | values with a truth | farther from it by more than a standard uncertainty | nearer by more |\n\
+         | --- | --- | --- | --- | --- |\n",
+    );
+    let ended: Vec<&Judged> = all.iter().filter(|judged| judged.is_unexplained()).collect();
+    let added = ended.iter().filter(|judged| !judged.diagnosis.added.is_empty());
+    let farther: Vec<f64> = added
+        .clone()
+        .flat_map(|judged| &judged.values)
+        .map(|value| value.farther)
+        .filter(|by| by.is_finite())
+        .collect();
+    let count = |which: &dyn Fn(f64) -> bool| farther.iter().filter(|by| which(**by)).count();
+    line(
+        &mut text,
+        format_args!(
+            "| {} | {} | {} | {} | {} |",
+            ended.len(),
+            added.count(),
+            farther.len(),
+            count(&|by| by > 1.0),
+            count(&|by| by < -1.0)
+        ),
+    );
+    text
+}
+
 fn values(all: &[Judged]) -> String {
     let mut text = String::from(
         "| value, error over its std | clean: number, within 2 | effects visible, declared model: number, within 2 | final model: \
