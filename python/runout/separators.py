@@ -357,6 +357,9 @@ class SpatialError:
     kriging: Union[Mapping[str, Any], None] = None
     """The covariance of the field."""
 
+    pitch_mm: Union[Sequence[float], None] = None
+    """Periods of the ball screws or scales of X, Y and Z, in mm; 0 where one is not known: `diagnose` then looks for it."""
+
     query: Union[Mapping[str, Any], None] = None
     """Where to predict and to compensate; at the measured places without it."""
 

@@ -163,8 +163,11 @@ mod tests {
         );
     }
 
+    /// Places, passes and readings.
+    type Passes = (Vec<usize>, Vec<(String, Vec<usize>)>, Vec<[f64; 3]>);
+
     /// Passes over 12 places, the second one in an order of its own, and what is read at each place.
-    fn two_passes() -> (Vec<usize>, Vec<(String, Vec<usize>)>, Vec<[f64; 3]>) {
+    fn two_passes() -> Passes {
         let place: Vec<usize> = (0..12).chain((0..12).map(|row| row * 5 % 12)).collect();
         let read = |(row, place): (usize, &usize)| {
             let x = *place as f64;
