@@ -79,6 +79,28 @@ pub struct LimitValue {
     pub missing: Option<String>,
 }
 
+impl LimitValue {
+    /// Where it is: "s31, section a"; of a domain's own value what it is of, "X".
+    #[must_use]
+    pub fn place(&self) -> String {
+        let own = self.reference.is_empty() && self.filter.is_empty();
+        let section = self.section.as_ref().map(|id| if own { id.clone() } else { format!("section {id}") });
+        let words: Vec<String> = self.station.iter().cloned().chain(section).collect();
+        if words.is_empty() { "whole part".to_owned() } else { words.join(", ") }
+    }
+
+    /// Reference and filter: "MZCI, Gaussian 50 UPR"; empty of a domain's own value.
+    #[must_use]
+    pub fn by(&self) -> String {
+        [&self.reference, &self.filter]
+            .map(String::as_str)
+            .into_iter()
+            .filter(|text| !text.is_empty())
+            .collect::<Vec<_>>()
+            .join(", ")
+    }
+}
+
 impl Limit {
     /// "RONt of section a ≤ 5 um".
     #[must_use]

@@ -21,13 +21,17 @@ enum Separator {
 pub(crate) fn read(input: &InputFile, given: Option<&[String]>) -> Result<RawTable> {
     let shown = input.path().display().to_string();
     let mut file = BufReader::new(input.open()?);
-    let (separator, first) = separator(&mut file).map_err(|error| failed(&shown, error))?;
-    let is_number = |word: &str| word.trim().replace(',', ".").parse::<f64>().is_ok();
-    if given.is_none() && !first.is_empty() && first.iter().all(|word| is_number(word)) {
+    let Start { separator, words: first, comment, skipped } =
+        Start::of(&mut file).map_err(|error| failed(&shown, error))?;
+    let are_numbers = !first.is_empty() && first.iter().all(|word| is_number(word));
+    // NumPy writes names behind a `#`.
+    let named = comment.filter(|names| are_numbers && names.len() == first.len());
+    if given.is_none() && named.is_none() && are_numbers {
         let problem = format!("its first line has {} numbers and no names of columns", first.len());
-        return Err(Error::new("read", format!("{shown}, line 1"), problem)
+        return Err(Error::new("read", format!("{shown}, line {}", skipped + 1), problem)
             .help("`names = [\"x_mm\", …]` in [load] names them in their order"));
     }
+    let given = given.or(named.as_deref());
     let mut rows = Rows { columns: Vec::new(), lines: Vec::new(), names: Vec::new(), shown: &shown };
     rows.name(given.map_or(first, <[String]>::to_vec));
     match separator {
@@ -36,6 +40,7 @@ pub(crate) fn read(input: &InputFile, given: Option<&[String]>) -> Result<RawTab
                 .delimiter(delimiter)
                 .trim(Trim::All)
                 .has_headers(given.is_none())
+                .comment(Some(COMMENT))
                 .from_reader(file);
             if given.is_none() {
                 let header = reader.byte_headers().map_err(|error| failed(&shown, error))?;
@@ -44,7 +49,7 @@ pub(crate) fn read(input: &InputFile, given: Option<&[String]>) -> Result<RawTab
             let mut record = ByteRecord::new();
             while reader.read_byte_record(&mut record).map_err(|error| failed(&shown, error))? {
                 let line = record.position().map_or(0, csv::Position::line);
-                rows.add(line, record.iter())?;
+                rows.add(skipped + line, record.iter())?;
             }
         }
         Separator::Blanks => {
@@ -55,8 +60,9 @@ pub(crate) fn read(input: &InputFile, given: Option<&[String]>) -> Result<RawTab
                     break;
                 }
                 let words = bytes.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
-                if (line > 1 || given.is_some()) && words.clone().next().is_some() {
-                    rows.add(line, words)?;
+                let is_row = words.clone().next().is_some_and(|word| word[0] != COMMENT);
+                if (line > 1 || given.is_some()) && is_row {
+                    rows.add(skipped + line, words)?;
                 }
             }
         }
@@ -101,20 +107,59 @@ impl Rows<'_> {
     }
 }
 
-/// The separator of the first line, which then stands for the whole file, and the words of that line; skips a byte order mark.
-fn separator(file: &mut BufReader<File>) -> std::io::Result<(Separator, Vec<String>)> {
-    let mut header = Vec::new();
-    // A header is short; a file without line ends is no reason to read it all twice.
-    file.by_ref().take(4096).read_until(b'\n', &mut header)?;
-    let mark = if header.starts_with("\u{feff}".as_bytes()) { 3 } else { 0 };
-    file.seek(std::io::SeekFrom::Start(mark))?;
-    let line = String::from_utf8_lossy(&header[mark as usize..]).trim().to_owned();
+/// What begins a line that is no row.
+const COMMENT: u8 = b'#';
+
+fn is_number(word: &str) -> bool {
+    word.trim().replace(',', ".").parse::<f64>().is_ok()
+}
+
+/// The first line that is no comment.
+struct Start {
+    /// It stands for the whole file.
+    separator: Separator,
+    words: Vec<String>,
+    /// Words of the last comment before it.
+    comment: Option<Vec<String>>,
+    /// Lines before it.
+    skipped: u64,
+}
+
+impl Start {
+    /// Leaves the file at that line; skips a byte order mark.
+    fn of(file: &mut BufReader<File>) -> std::io::Result<Self> {
+        let (mut start, mut skipped, mut comment) = (0, 0, None);
+        loop {
+            let mut bytes = Vec::new();
+            // A header is short; a file without line ends is no reason to read it all twice.
+            let read = file.by_ref().take(65536).read_until(b'\n', &mut bytes)? as u64;
+            if start == 0 && bytes.starts_with("\u{feff}".as_bytes()) {
+                bytes.drain(..3);
+                start = 3;
+            }
+            let mark = if start == 3 && skipped == 0 { 3 } else { 0 };
+            let line = String::from_utf8_lossy(&bytes).trim().to_owned();
+            let Some(said) = line.strip_prefix(char::from(COMMENT)) else {
+                file.seek(std::io::SeekFrom::Start(start))?;
+                let (separator, words) = separated(&line);
+                let comment = comment.map(|comment: String| separated(&comment).1);
+                return Ok(Self { separator, words, comment, skipped });
+            };
+            comment = Some(said.trim().to_owned());
+            start += read - mark;
+            skipped += 1;
+        }
+    }
+}
+
+/// The separator of a line, and its words.
+fn separated(line: &str) -> (Separator, Vec<String>) {
     if let Some(byte) = line.bytes().find(|byte| b",;\t".contains(byte)) {
         let mut reader =
             ReaderBuilder::new().delimiter(byte).trim(Trim::All).has_headers(false).from_reader(line.as_bytes());
         let mut record = csv::StringRecord::new();
         let _ = reader.read_record(&mut record);
-        return Ok((Separator::Byte(byte), record.iter().map(str::to_owned).collect()));
+        return (Separator::Byte(byte), record.iter().map(str::to_owned).collect());
     }
     let mut words: Vec<String> = Vec::new();
     for word in line.split_whitespace() {
@@ -125,5 +170,5 @@ fn separator(file: &mut BufReader<File>) -> std::io::Result<(Separator, Vec<Stri
         }
     }
     let separator = if words.len() > 1 { Separator::Blanks } else { Separator::Byte(b',') };
-    Ok((separator, words))
+    (separator, words)
 }

@@ -93,8 +93,8 @@ fn table(limit: &Limit, values: &[&LimitValue]) -> Markup {
                     @for value in values {
                         @let (decision, class) = word(value.decision);
                         tr {
-                            td { bdi { (place(value)) } }
-                            td { (value.reference) ", " (value.filter) }
+                            td { bdi { (value.place()) } }
+                            td { (value.by()) }
                             td.number { (digits(value.value, value)) }
                             td.number {
                                 @if let Some([low, high]) = value.interval_95 { (digits(low, value)) " … " (digits(high, value)) }
@@ -110,15 +110,6 @@ fn table(limit: &Limit, values: &[&LimitValue]) -> Markup {
                 }
             }
         }
-    }
-}
-
-fn place(value: &LimitValue) -> String {
-    match (&value.station, &value.section) {
-        (None, None) => "whole part".into(),
-        (Some(station), None) => station.clone(),
-        (None, Some(section)) => format!("section {section}"),
-        (Some(station), Some(section)) => format!("{station}, section {section}"),
     }
 }
 

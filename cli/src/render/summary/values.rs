@@ -83,11 +83,9 @@ fn deciding(limit: &LimitSummary) -> Option<&LimitValue> {
 
 /// "s31, section a, MZCI, 5.31".
 fn place(value: &LimitValue) -> String {
-    let section = value.section.as_ref().map(|section| format!("section {section}"));
-    let filter = (value.filter != "none").then(|| value.filter.clone());
-    let words =
-        [value.station.clone(), section, Some(value.reference.clone()), filter, Some(significant(value.value, 4))];
-    words.into_iter().flatten().collect::<Vec<_>>().join(", ")
+    let by = value.by().trim_end_matches(", none").to_owned();
+    let words = [value.place(), by, significant(value.value, 4)];
+    words.into_iter().filter(|word| !word.is_empty()).collect::<Vec<_>>().join(", ")
 }
 
 #[cfg(test)]

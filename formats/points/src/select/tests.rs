@@ -149,3 +149,29 @@ fn every_mistake_is_named_with_its_place() {
     }
     assert!(open(Path::new("/nonexistent/cylinder.csv"), "", &TRACED).is_err());
 }
+
+/// Comments are skipped; NumPy writes the names of columns as one.
+#[test]
+fn lines_behind_a_hash_are_no_rows() {
+    const PLACES: [PointColumn; 2] = [
+        PointColumn::needed("x_mm", PointKind::Number, "mm", "place"),
+        PointColumn::needed("y_um", PointKind::Number, "um", "deviation"),
+    ];
+    for text in [
+        "# made by hand\n# second line, with a comma\nx_mm,y_um\n1,2\n# between\n3,4\n",
+        "\u{feff}# made by hand\nx_mm;y_um\n1;2\n3;4\n",
+        "# x_mm y_um\n1.0 2.0\n3.0 4.0\n",
+        "#x_mm,y_um\n1.0,2.0\n3.0,4.0\n",
+        "# note\nx_mm y_um\n1 2\n# between\n3 4\n",
+    ] {
+        let points = from(text, "", &PLACES).unwrap_or_else(|error| panic!("{text}: {error}"));
+        let found = ["x_mm", "y_um"].map(|name| points.column(name).unwrap().to_vec());
+        assert_eq!(found, [vec![1.0, 3.0], vec![2.0, 4.0]], "{text}");
+    }
+    let named = from("# any words at all\n1 2\n3 4\n", "names = [\"x_mm\", \"y_um\"]", &PLACES).unwrap();
+    assert_eq!(named.column("y_um").unwrap(), [2.0, 4.0]);
+    let message = from("# any words at all\n1 2\n3 4\n", "", &PLACES).unwrap_err().to_string();
+    assert!(message.contains("line 2: its first line has 2 numbers"), "{message}");
+    let message = from("# note\nx_mm,y_um\n1,2\n3,four\n", "", &PLACES).unwrap_err().to_string();
+    assert!(message.contains("line 4"), "{message}");
+}
