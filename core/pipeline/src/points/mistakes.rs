@@ -166,15 +166,15 @@ mod tests {
     /// Places, passes and readings.
     type Passes = (Vec<usize>, Vec<(String, Vec<usize>)>, Vec<[f64; 3]>);
 
-    /// Passes over 12 places, the second one in an order of its own, and what is read at each place.
+    /// Passes over 13 places, the second one in an order that is not its own inverse, and what is read at each place.
     fn two_passes() -> Passes {
-        let place: Vec<usize> = (0..12).chain((0..12).map(|row| row * 5 % 12)).collect();
+        let place: Vec<usize> = (0..13).chain((0..13).map(|row| row * 5 % 13)).collect();
         let read = |(row, place): (usize, &usize)| {
             let x = *place as f64;
             [x.sin() * 8.0 + 0.1 * (row as f64).cos(), x * x - 7.0 * x, f64::NAN]
         };
         let readings = place.iter().enumerate().map(read).collect();
-        let passes = vec![("pass 1".to_owned(), (0..12).collect()), ("pass 2".to_owned(), (12..24).collect())];
+        let passes = vec![("pass 1".to_owned(), (0..13).collect()), ("pass 2".to_owned(), (13..26).collect())];
         (place, passes, readings)
     }
 
@@ -182,15 +182,15 @@ mod tests {
     fn readings_of_passes_that_stand_at_wrong_places_are_named() {
         let (place, runs, sound) = two_passes();
         assert!(passes(&place, &runs, &sound).is_some_and(|check| check.finding.is_empty()));
-        let exchanged: Vec<[f64; 3]> = sound[12..].iter().chain(&sound[..12]).copied().collect();
+        let exchanged: Vec<[f64; 3]> = sound[13..].iter().chain(&sound[..13]).copied().collect();
         let found = passes(&place, &runs, &exchanged).unwrap();
         assert!(found.refutes() && found.finding.contains("pass 1 and pass 2 are exchanged"), "{}", found.finding);
-        let reversed: Vec<[f64; 3]> = sound[..12].iter().chain(sound[12..].iter().rev()).copied().collect();
+        let reversed: Vec<[f64; 3]> = sound[..13].iter().chain(sound[13..].iter().rev()).copied().collect();
         let found = passes(&place, &runs, &reversed).unwrap();
         assert!(found.finding.contains("pass 2 are in reverse order"), "{}", found.finding);
         // One pass, and passes that share no place, say nothing.
-        assert!(passes(&place[..12], &runs[..1], &sound[..12]).is_none());
-        let apart: Vec<usize> = (0..24).collect();
+        assert!(passes(&place[..13], &runs[..1], &sound[..13]).is_none());
+        let apart: Vec<usize> = (0..26).collect();
         assert!(passes(&apart, &runs, &sound).is_none());
     }
 
