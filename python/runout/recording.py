@@ -99,7 +99,7 @@ class Points:
     def from_arrays(cls, columns: Mapping[str, Array] | None = None, **more: Array) -> Points:
         """Points of columns of one length: `Points.from_arrays(angle_deg=a, x_um=x)`, or a dictionary or frame of them.
 
-        Numbers that are NaN or None were not measured; texts are names. Raises ValueError where the lengths differ.
+        Numbers that are NaN, None or masked were not measured, which a separator may allow of a component; texts are names. Raises ValueError where the lengths differ.
         """
         given = {} if columns is None else {str(name): columns[name] for name in columns}
         given |= more
@@ -120,6 +120,8 @@ class Points:
 
 
 def _column(given: Array, name: str) -> list[Any]:
+    if isinstance(given, np.ma.MaskedArray):
+        given = given.astype(np.float64).filled(np.nan) if given.dtype.kind in "fiu" else given.filled(None)
     array = np.asarray(given)
     if array.ndim != 1 or not len(array):
         raise ValueError(f"{name}: expected a column of at least one value, found the shape {array.shape}")

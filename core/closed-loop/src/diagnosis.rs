@@ -53,12 +53,21 @@ impl Diagnosis {
         self.warnings.iter().filter(|warning| !self.notes.contains(warning))
     }
 
-    /// The verdict in one sentence, and the confounded sets that the data do not decide.
+    /// The verdict in one sentence with what refutes the final model, and the confounded sets that the data do not decide.
     #[must_use]
     pub fn headline(&self) -> String {
+        self.with_sets(&refuted_by(&self.consistency).map(|said| format!(": {said}")).unwrap_or_default())
+    }
+
+    /// The same without what refutes the final model.
+    #[must_use]
+    pub fn outcome(&self) -> String {
+        self.with_sets("")
+    }
+
+    fn with_sets(&self, refuted: &str) -> String {
         let undecided = self.added.iter().filter(|one| !one.confounded_with.is_empty());
         let sets: Vec<String> = undecided.map(Added::members).collect();
-        let refuted = refuted_by(&self.consistency).map(|said| format!(": {said}")).unwrap_or_default();
         let verdict = format!("{}{refuted}", self.in_words());
         if sets.is_empty() { verdict } else { format!("{verdict}. Not decided: {}", sets.join("; ")) }
     }

@@ -46,13 +46,22 @@ impl Answer {
     }
 }
 
-/// What refutes values, each once: what is said of a station alone is left out where the whole says the same.
+/// What refutes values, each once: what is said of a station alone is left out where the whole says the same, and so is the name of the only one.
 fn contradictions(summary: &Summary) -> Vec<String> {
     let (reasons, _) = summary.refuted();
-    let mut said: Vec<&str> = reasons.into_iter().map(|(reason, _)| reason).collect();
+    let of_one = |reason: &str| match &summary.stations[..] {
+        [only] => reason.replace(&format!("{}: ", only.station), ""),
+        _ => reason.to_owned(),
+    };
+    let mut said: Vec<String> = Vec::new();
+    for reason in reasons.into_iter().map(|(reason, _)| of_one(reason)) {
+        if !said.contains(&reason) {
+            said.push(reason);
+        }
+    }
     let all = said.clone();
     said.retain(|reason| !all.iter().any(|other| other != reason && reason.ends_with(&format!(": {other}"))));
-    said.into_iter().map(str::to_owned).collect()
+    said
 }
 
 /// The residual, the effects and the values that moved most: before → after.

@@ -297,7 +297,7 @@ mod tests {
 
     #[test]
     fn noise_has_no_twist() {
-        assert!(twist(&map(noise)).unwrap_err().contains("stands out"));
+        assert!(twist(&map(noise)).unwrap_err().contains("is significant"));
         let gapped = map(noise);
         let mut heights = gapped.heights_um().to_vec();
         heights[7] = f64::NAN;

@@ -28,7 +28,7 @@ use serde::Deserialize;
 
 use crate::{
     draws::{Computed, Draw, Machine, with_uncertainty, without_noise},
-    paths::{ANGLES, Paths, mean_of, refused},
+    paths::{Paths, mean_of, refused},
 };
 
 /// `[separate] plugin = "circular"`.
@@ -105,7 +105,7 @@ impl PointSeparator for Circular {
             Computed { symbol, value, about, is_key, least }
         });
         let computed: Vec<Computed> = computed.collect();
-        let noise = Noise::of(&paths.turns);
+        let noise = Noise::of(&paths.turns, paths.angles);
         let values_of = |means: &[Vec<f64>], longer_um: f64| -> Vec<f64> {
             let values = self.values(&paths, means, longer_um);
             values.map_or_else(
@@ -121,9 +121,14 @@ impl PointSeparator for Circular {
             let again = values_of(&again, self.0.radius_std_um * draw.normal());
             again.iter().zip(truth).map(|(again, truth)| again - truth).collect()
         };
-        let mut remarks = Vec::new();
-        let known = paths.turns.iter().all(|turns| turns.len() > 1);
-        if !known {
+        let mut remarks = paths.remarks.clone();
+        let several = paths.turns.iter().all(|turns| turns.len() > 1);
+        let copies = several && noise.is_none();
+        if copies {
+            remarks.push("the turns are identical: copies show no uncertainty".into());
+        }
+        let known = several && !copies;
+        if !several {
             remarks.push(
                 "one turn in a direction: nothing shows its uncertainty; record two or more turns in each direction"
                     .into(),
@@ -155,11 +160,12 @@ impl Circular {
     /// The values of paths; nothing where they have no reference circle. `longer_um` is what the instrument is longer by than it says.
     fn values(&self, paths: &Paths, means: &[Vec<f64>], longer_um: f64) -> Option<Vec<(String, f64, &'static str)>> {
         let mut points = roundness::Points::default();
-        let one = || (0..ANGLES).map(|angle| TAU * angle as f64 / ANGLES as f64);
+        let count = paths.angles;
+        let one = || (0..count).map(move |angle| TAU * angle as f64 / count as f64);
         let zone = |points: &roundness::Points| Some(points.values(&points.reference(Reference::MinimumZone)?).ront_um);
         let mut values = Vec::new();
         for (sign, path_um) in paths.signs.iter().zip(means) {
-            points.set_profile(&Angles::equal(ANGLES), path_um, self.0.radius_mm);
+            points.set_profile(&Angles::equal(count), path_um, self.0.radius_mm);
             let name = format!("G{}", if *sign > 0 { '+' } else { '-' });
             values.push((
                 name,
@@ -196,6 +202,8 @@ impl Circular {
     }
 }
 
+/// Variance below which turns are copies: of rounding.
+const IDENTICAL_UM2: f64 = 1e-24;
 /// Orders of which a turn is off by as a whole: by an error of its own shape. Above, errors are of any phase.
 const OF_A_TURN: usize = 8;
 
@@ -210,8 +218,8 @@ struct Noise {
 }
 
 impl Noise {
-    fn of(turns: &[Vec<Vec<f64>>]) -> Self {
-        let mut fourier = Fourier::new(ANGLES);
+    fn of(turns: &[Vec<Vec<f64>>], angles: usize) -> Self {
+        let mut fourier = Fourier::new(angles);
         let mut variance = vec![0.0; fourier.max_order() + 1];
         let mut harmonics = vec![Complex64::ZERO; variance.len()];
         let mut of_turns = Vec::new();
@@ -230,9 +238,14 @@ impl Noise {
         Self { variance, freedom, of_turns }
     }
 
+    /// Whether nothing changes: no two recorded turns are alike.
+    fn is_none(&self) -> bool {
+        self.variance.iter().all(|variance| *variance < IDENTICAL_UM2)
+    }
+
     /// Means of turns without the power that noise has in each order.
     fn taken_out(&self, means: &[Vec<f64>], turns: &[Vec<Vec<f64>>]) -> Vec<Vec<f64>> {
-        let mut fourier = Fourier::new(ANGLES);
+        let mut fourier = Fourier::new(means.first().map_or(1, Vec::len));
         let mut harmonics = vec![Complex64::ZERO; self.variance.len()];
         let mut taken = Vec::new();
         for (mean, turns) in means.iter().zip(turns) {
@@ -261,7 +274,7 @@ impl Noise {
 
     /// Means of turns with another error of theirs.
     fn added_to(&self, means: &[Vec<f64>], turns: &[Vec<Vec<f64>>], draw: &mut Draw) -> Vec<Vec<f64>> {
-        let mut fourier = Fourier::new(ANGLES);
+        let mut fourier = Fourier::new(means.first().map_or(1, Vec::len));
         let variance: Vec<f64> =
             self.variance.iter().map(|variance| variance * draw.true_std_ratio(2 * self.freedom).powi(2)).collect();
         let mut again = Vec::new();
@@ -308,7 +321,7 @@ fn rows(paths: &Paths, means: &[Vec<f64>]) -> Result<TableRows> {
     };
     let rows = spec.rows(vec![
         texts(each().map(|(sign, ..)| if sign > 0 { "+" } else { "-" })),
-        numbers(each().map(|(_, angle, _)| 360.0 * angle as f64 / ANGLES as f64)),
+        numbers(each().map(|(_, angle, _)| 360.0 * angle as f64 / paths.angles as f64)),
         numbers(each().map(|(.., value)| value)),
     ])?;
     Ok(TableRows { table: spec.name, rows })

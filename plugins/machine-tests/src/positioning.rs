@@ -36,8 +36,11 @@ use crate::{
 
 /// Runs that the standard asks for.
 const RUNS: usize = 5;
-/// Runs drift where the first and the last differ by so many standard uncertainties.
-const DRIFTS: f64 = 5.0;
+/// Runs are off as a whole where their means scatter by so many times what the noise at single targets makes.
+const OFF: f64 = 3.0;
+/// They drift where their means go with their number, by this correlation, which chance makes once in a hundred of five runs.
+const TREND: f64 = 0.93;
+const FEWEST_FOR_A_TREND: usize = 4;
 
 /// `[separate] plugin = "positioning"`.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
@@ -156,13 +159,18 @@ impl PointSeparator for Positioning {
         let error = |machine: Machine, draw: &mut Draw| {
             let cells = if machine == Machine::Least { &least } else { &cells };
             let (truth, again) = cells.measured_again(&noise, draw);
-            let slope = scale * draw.normal();
-            let again = again.tilted(&approaches.targets, slope);
             let of = |cells: &Cells| cells.values(&approaches.sides).into_iter().map(|(_, value, _)| value);
-            of(&again).zip(of(&truth)).map(|(again, truth)| again - truth).collect()
+            // Noise raises ranges, and the values are less by that. The scale is one unknown number: the machine is what was found, less it.
+            let scaled = of(&cells.clone().tilted(&approaches.targets, scale * draw.normal()));
+            let errors = of(&again).zip(of(&truth)).zip(scaled.zip(of(cells)));
+            errors.map(|((again, truth), (scaled, found))| (again - truth) - (scaled - found)).collect()
         };
         let seed = seed(&["positioning", &self.0.axis]);
-        let values = with_uncertainty(&computed, deviation.unit, seed, error);
+        let mut values = with_uncertainty(&computed, deviation.unit, seed, error);
+        if noise.own_std == 0.0 {
+            // Copies show no uncertainty.
+            values.iter_mut().for_each(|value| (value.std, value.interval_95) = (None, None));
+        }
         Ok(Outcome {
             convention: format!(
                 "deviation is actual less commanded position of {}; + is an approach in the positive direction",
@@ -207,15 +215,24 @@ fn remarks(approaches: &Approaches, noise: &Noise, unit: &str) -> Vec<String> {
             "{runs} runs: ISO 230-2 asks for {RUNS} from each side; repeatability of so few is uncertain"
         ));
     }
-    let std = noise.own_std * (2.0 / (approaches.targets.len() * approaches.sides.len()) as f64).sqrt();
-    if let [first, .., last] = noise.course[..] {
-        let change: f64 = last - first;
-        if change.abs() > DRIFTS * std {
-            remarks.push(format!(
-                "the runs drift: the last one lies {change:+.2} {unit} from the first one on average over all targets (± {std:.2}); R and A contain it"
-            ));
-        }
+    let most = approaches.deviations.iter().flatten().map(Vec::len).max().unwrap_or(0);
+    if most > runs {
+        remarks.push(format!("targets were approached {runs} to {most} times from a side"));
     }
+    if noise.own_std == 0.0 {
+        remarks.push("the runs are identical: copies show no uncertainty".into());
+    }
+    let std = noise.own_std / ((approaches.targets.len() * approaches.sides.len()) as f64).sqrt();
+    let trend = noise.trend();
+    if noise.common_std > OFF * std && std > 0.0 {
+        let change = noise.course.last().zip(noise.course.first()).map_or(0.0, |(last, first)| last - first);
+        remarks.push(if runs >= FEWEST_FOR_A_TREND && trend.abs() > TREND {
+            format!("the runs drift: the last one lies {change:+.2} {unit} from the first one on average over all targets; R and A contain it")
+        } else {
+            format!("runs differ as a whole, by a standard deviation of {:.2} {unit}; R and A contain it", noise.common_std)
+        });
+    }
+    remarks.extend(approaches.outliers(noise.own_std, unit));
     if approaches.sides.len() == 1 {
         remarks.push(
             "all targets were approached from one side: there is no reversal value and no bidirectional value".into(),

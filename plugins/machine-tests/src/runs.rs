@@ -1,6 +1,6 @@
 //! Approaches of target positions: which target, from which side, in which run.
 
-use runout_core::{Error, ErrorKind, Result, points::Points};
+use runout_core::{Error, ErrorKind, Result, numerics::statistics::median, points::Points};
 
 /// Two targets are one where they differ by less than this share of the travel: commands are written with few digits.
 const SAME_TARGET: f64 = 1e-7;
@@ -15,7 +15,37 @@ pub(crate) struct Approaches {
     pub deviations: Vec<Vec<Vec<f64>>>,
 }
 
+/// A single approach lies off the others of its target by so many standard deviations of all approaches, without the largest.
+const OUTLIER: f64 = 12.0;
+
 impl Approaches {
+    /// Approaches that are not like the others of their target, in words.
+    pub(crate) fn outliers(&self, own_std: f64, unit: &str) -> Option<String> {
+        let mut farthest = (0.0, String::new());
+        let mut squares = Vec::new();
+        for (target, of_target) in self.targets.iter().zip(&self.deviations) {
+            for (side, runs) in self.sides.iter().zip(of_target) {
+                let middle = median(runs.iter().copied());
+                for (run, deviation) in runs.iter().enumerate() {
+                    let off = deviation - middle;
+                    squares.push(off.abs());
+                    if off.abs() > f64::abs(farthest.0) {
+                        farthest = (off, format!("approach {} of target {target} in direction {side:+}", run + 1));
+                    }
+                }
+            }
+        }
+        // Half of all lie within 0.67 standard deviations.
+        let usual = median(squares) / 0.6745;
+        let (off, place) = farthest;
+        (usual > 0.0 && own_std > 0.0 && off.abs() > OUTLIER * usual).then(|| {
+            format!(
+                "{place} lies {off:+.2} {unit} from the others, {:.0} times what is usual: A and R contain it",
+                off.abs() / usual
+            )
+        })
+    }
+
     /// Sorts points. Without a column `direction` the side follows from the target before, in the order of the rows.
     ///
     /// # Errors
@@ -123,8 +153,20 @@ pub(crate) struct Noise {
     pub freedom_own: usize,
 }
 
+impl Noise {
+    /// Correlation of the runs' deviations with their number.
+    pub(crate) fn trend(&self) -> f64 {
+        let middle = 0.5 * (self.runs as f64 - 1.0);
+        let each = || self.course.iter().enumerate().map(|(run, level)| (run as f64 - middle, level));
+        let along: f64 = each().map(|(run, level)| run * level).sum();
+        let [runs, levels] =
+            [each().map(|(run, _)| run * run).sum::<f64>(), each().map(|(_, level)| level * level).sum()];
+        if levels > 0.0 { along / (runs * levels).sqrt() } else { 0.0 }
+    }
+}
+
 /// Sides as a file states them.
-fn stated(column: &[f64]) -> std::result::Result<Vec<i8>, String> {
+pub(crate) fn stated(column: &[f64]) -> std::result::Result<Vec<i8>, String> {
     let side = |(row, value): (usize, &f64)| match *value {
         1.0 => Ok(1),
         -1.0 => Ok(-1),

@@ -109,3 +109,60 @@ fn a_circle_has_the_values_of_its_geometry() {
         assert!((value(&found, symbol) - expected).abs() < 0.01, "{symbol}: {} {expected}", value(&found, symbol));
     }
 }
+
+/// Identical turns, however many and however they end, are one turn: a peak at 0° stays whole.
+#[test]
+fn turns_are_parted_where_they_end() {
+    let deviation = |angle: f64| {
+        let from_zero = (angle + 180.0).rem_euclid(360.0) - 180.0;
+        3.0 * (2.0 * angle.to_radians()).sin() + 4.0 * (-from_zero * from_zero / 2.0).exp()
+    };
+    let recorded = |turns: i32, wrapped: bool, end: i32, first: f64| {
+        let mut columns = [("angle_deg", Vec::new()), ("deviation_um", Vec::new())];
+        for side in [first, -first] {
+            for step in 0..turns * 360 + end {
+                let angle = side * f64::from(step);
+                columns[0].1.push(if wrapped { angle.rem_euclid(360.0) } else { angle });
+                columns[1].1.push(deviation(angle) + 0.001 * f64::from(step / 360));
+            }
+        }
+        let config = CircularConfig { plane: "XY".into(), radius_mm: 100.0, radius_std_um: 0.0 };
+        outcome(config, &columns).unwrap()
+    };
+    let one = recorded(1, false, 0, 1.0);
+    for turns in 2..6 {
+        for (wrapped, end, first) in [(false, 0, 1.0), (true, 0, -1.0), (true, 1, 1.0), (false, 1, -1.0)] {
+            let found = recorded(turns, wrapped, end, first);
+            for symbol in ["G+", "G-", "G_b", "H"] {
+                let off = (value(&found, symbol) - value(&one, symbol)).abs();
+                assert!(off < 1e-3, "{turns} turns, {wrapped} {end} {first}: {symbol} {off}");
+            }
+        }
+    }
+}
+
+/// The scale of the instrument is one unknown number: an axis without errors may have all of it.
+#[test]
+fn an_unknown_scale_is_in_the_interval() {
+    let mut columns = [("target_mm", Vec::new()), ("deviation_um", Vec::new())];
+    for run in 0..5 {
+        for target in [(0..11).collect::<Vec<i32>>(), (0..11).rev().collect()].concat() {
+            columns[0].1.push(100.0 * f64::from(target));
+            columns[1].1.push(0.01 * f64::from((run * 13 + target * 7) % 5));
+        }
+    }
+    let found = outcome(PositioningConfig { scale_std_ppm: 1.0, ..positioning() }, &columns).unwrap();
+    for symbol in ["A", "E", "M"] {
+        let [low, high] = found.values.iter().find(|value| value.symbol == symbol).unwrap().interval_95.unwrap();
+        // Of a normal number of 1 µm at the far end, 5 % are above 1.96 µm by their absolute value.
+        assert!(low < value(&found, symbol) + 0.1 && (1.5..3.0).contains(&high), "{symbol}: {low} to {high}");
+    }
+    let copies: Vec<f64> = columns[1].1[..22].iter().copied().cycle().take(110).collect();
+    let copied = outcome(positioning(), &[columns[0].clone(), ("deviation_um", copies)]).unwrap();
+    assert!(copied.values.iter().all(|value| value.std.is_none() && value.interval_95.is_none()));
+    assert!(copied.remarks.iter().any(|remark| remark.contains("the runs are identical")), "{:?}", copied.remarks);
+    let mut odd = columns.clone();
+    odd[1].1[37] += 1000.0;
+    let odd = outcome(positioning(), &odd).unwrap();
+    assert!(odd.remarks.iter().any(|remark| remark.contains("times what is usual")), "{:?}", odd.remarks);
+}

@@ -74,9 +74,16 @@ pub(super) fn look(table: &TurnTable, course: &mut Course) {
     course.phase = course.phase.and_then(|phase| settled(phase, table));
 }
 
+/// Rows on either side of a step at least: of fewer, place and size are one guess.
+const FEWEST_BESIDE: f64 = 3.5;
+
 /// The phase that leaves nothing of its shape when it is taken out of all orders; `None` where too few orders show it.
 fn settled(mut phase: PhaseCourse, table: &TurnTable) -> Option<PhaseCourse> {
     let (rows, together) = (table.rows() as f64, table.together.max(1) as f64);
+    let beside = phase.step_at.map(|[turns, _]| (turns / together).min(rows - turns / together));
+    if beside.is_some_and(|rows| rows < FEWEST_BESIDE) {
+        return None;
+    }
     for _ in 0..ROUNDS {
         let shape = PhaseCourse { by_rad: 1.0, ..phase }.at(table);
         let middle = shape.iter().sum::<f64>() / rows;

@@ -27,7 +27,7 @@ pub enum Judgement {
 
 /// Limits first, then what the closed loop or the tests of the data say.
 pub(super) fn verdict(summary: &Summary, diagnosis: Option<&Diagnosis>) -> Verdict {
-    let (found, judgement) = diagnosis.map_or_else(|| of_data(summary), of_loop);
+    let (found, judgement) = diagnosis.map_or_else(|| of_data(summary), |diagnosis| of_loop(diagnosis, summary));
     let contradicted = judgement == Judgement::Bad;
     match of_limits(summary) {
         Some((limits, of_limits)) => {
@@ -43,7 +43,7 @@ fn lower_first(text: &str) -> String {
     letters.next().map(|first| first.to_lowercase().chain(letters).collect()).unwrap_or_default()
 }
 
-fn of_loop(diagnosis: &Diagnosis) -> (String, Judgement) {
+fn of_loop(diagnosis: &Diagnosis, summary: &Summary) -> (String, Judgement) {
     let judgement = match diagnosis.verdict {
         // Effects between which the data do not decide leave the result open.
         diagnosis::Verdict::Explained if diagnosis.added.iter().any(|added| !added.confounded_with.is_empty()) => {
@@ -53,7 +53,9 @@ fn of_loop(diagnosis: &Diagnosis) -> (String, Judgement) {
         diagnosis::Verdict::Unexplained => Judgement::Bad,
         diagnosis::Verdict::Improved | diagnosis::Verdict::NothingFound => Judgement::Open,
     };
-    (diagnosis.headline(), judgement)
+    // What refutes values is said of them.
+    let is_said = !summary.refuted().0.is_empty();
+    (if is_said { diagnosis.outcome() } else { diagnosis.headline() }, judgement)
 }
 
 /// What the tests of the data on themselves say.
