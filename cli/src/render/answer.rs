@@ -12,7 +12,7 @@ use super::{
 /// Behind a number that its own data refute.
 pub(crate) const REFUTED: &str = " !";
 /// Behind a number that lies outside its own interval.
-const OUTSIDE: &str = " ^";
+pub(crate) const OUTSIDE: &str = " ^";
 /// Digits of a number without a standard uncertainty.
 const DIGITS: usize = 4;
 /// Contradictions that are named; all are in the files.

@@ -37,6 +37,9 @@ pub(crate) struct Place<'a> {
     pub(crate) station: &'a StationKey,
 }
 
+/// Sensors of which one ends before another by more than this share were not recorded at one rate.
+const UNLIKE_LENGTHS: f64 = 0.05;
+
 impl Place<'_> {
     /// What the configuration calls the setup in the file.
     fn setup_name(&self) -> String {
@@ -138,7 +141,17 @@ impl Place<'_> {
         }
         let is_longer = |signal: &&&Signal| !common.is_resampled && signal.channel().samples > samples;
         if let Some(longer) = signals.iter().find(is_longer) {
-            let more = longer.channel().samples - samples;
+            let all = longer.channel().samples;
+            // One rate that is stated for channels of unlike length is that of one of them.
+            if longer.channel().rate_hz.is_none() && (all - samples) as f64 > UNLIKE_LENGTHS * samples as f64 {
+                let problem = format!(
+                    "it has {all} samples, where another sensor has {samples}: their rates look unlike, and the file states none"
+                );
+                return Err(longer.error(problem).of(ErrorKind::UnsuitableData).help(
+                    "give channels of one rate, or a file that states the rate of each channel (TDMS, WAV, UFF, HDF5 attributes, a time column for each)",
+                ));
+            }
+            let more = all - samples;
             remarks
                 .push(format!("{}: its last {more} samples are not used: another channel ends before", longer.shown));
         }

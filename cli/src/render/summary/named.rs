@@ -4,6 +4,7 @@ use runout_core::summary::NamedValue;
 
 use super::{described, mark, unit};
 use crate::render::{
+    answer::OUTSIDE,
     number::{significant, with_std},
     page::Page,
     table::Table,
@@ -113,5 +114,7 @@ fn number(value: &NamedValue) -> String {
         (Some(value), None) => significant(value, DIGITS),
         (None, _) => "not known".into(),
     };
-    number + mark(value.refuted_by.as_ref())
+    let is_outside = |(value, [low, high]): (f64, [f64; 2])| !(low..=high).contains(&value);
+    let is_outside = value.value.zip(value.interval_95).is_some_and(is_outside);
+    number + if is_outside { OUTSIDE } else { "" } + mark(value.refuted_by.as_ref())
 }
