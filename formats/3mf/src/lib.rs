@@ -10,35 +10,14 @@ use std::{
 };
 
 use quick_xml::escape::escape;
-use runout_core::{
-    fault::Fault,
-    pipeline::{Context, Plugin, Registry, StageConfig},
-    stage::Exporter,
-};
-use runout_mesh::{Format, Mesh, MeshConfig, Notes, UNMEASURED, palette};
-use schemars::JsonSchema;
-use serde::Deserialize;
+use runout_core::pipeline::Registry;
+use runout_mesh::{Format, Mesh, Notes, UNMEASURED, palette};
 use zip::{ZipWriter, write::SimpleFileOptions};
-
-/// The exporter `3mf`.
-#[derive(Debug, Clone, Deserialize, JsonSchema)]
-#[serde(transparent)]
-pub struct ThreeMfConfig(MeshConfig);
-
-impl StageConfig for ThreeMfConfig {
-    type Stage = Box<dyn Exporter>;
-
-    const NAME: &'static str = "3mf";
-    const ABOUT: &'static str = "writes the surface as a 3MF mesh in mm, coloured by deviation, for printing";
-
-    fn check(self, context: &Context) -> Result<Self::Stage, Fault> {
-        self.0.check(context, Format { extension: "3mf", unit: "mm", write })
-    }
-}
 
 /// Adds the exporter `3mf`.
 pub fn register(registry: &mut Registry) {
-    registry.exporters.add(Plugin::of::<ThreeMfConfig>());
+    let about = "writes the surface as a 3MF mesh in mm, coloured by deviation, for printing";
+    Format { name: "3mf", about, extension: "3mf", unit: "mm", write }.register(registry);
 }
 
 const CONTENT_TYPES: &str = r#"<?xml version="1.0" encoding="UTF-8"?>

@@ -88,19 +88,19 @@ impl Bytes {
     /// The next line without its end; nothing at the end of the file. A longer line is given in pieces.
     pub(crate) fn line(&mut self, longest: usize) -> Result<Option<Vec<u8>>> {
         let mut line = Vec::new();
-        let read = Read::by_ref(&mut self.file).take(longest as u64).read_until(b'\n', &mut line);
+        Ok(self.line_into(&mut line, longest)?.then_some(line))
+    }
+
+    /// Puts the next [line](Self::line) in the place of what is there; says whether there was one.
+    pub(crate) fn line_into(&mut self, line: &mut Vec<u8>, longest: usize) -> Result<bool> {
+        line.clear();
+        let read = Read::by_ref(&mut self.file).take(longest as u64).read_until(b'\n', line);
         read.map_err(|error| Error::caused("read", &self.shown, error))?;
         self.place += line.len() as u64;
-        if line.is_empty() {
-            return Ok(None);
-        }
-        if line.last() == Some(&b'\n') {
-            line.pop();
-        }
-        if line.last() == Some(&b'\r') {
-            line.pop();
-        }
-        Ok(Some(line))
+        let is_one = !line.is_empty();
+        line.pop_if(|last| *last == b'\n');
+        line.pop_if(|last| *last == b'\r');
+        Ok(is_one)
     }
 
     pub(crate) fn u8(&mut self) -> Result<u8> {

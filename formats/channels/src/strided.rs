@@ -238,16 +238,11 @@ fn append(run: &Run, bytes: &[u8], count: usize, to: &mut Vec<f64>) {
         };
         ($type:ty, $convert:expr) => {{
             const WIDTH: usize = size_of::<$type>();
-            let of = |bytes: &[u8]| bytes.first_chunk::<WIDTH>().copied().unwrap_or_default();
-            let convert = |bytes: [u8; WIDTH]| {
-                let number =
-                    if run.is_big_endian { <$type>::from_be_bytes(bytes) } else { <$type>::from_le_bytes(bytes) };
-                $convert(number)
-            };
-            if run.stride as usize == WIDTH {
-                to.extend(bytes.chunks_exact(WIDTH).map(|bytes| convert(of(bytes))));
+            // One loop for each order of bytes, without a branch in it.
+            if run.is_big_endian {
+                spaced::<WIDTH>(run.stride, bytes, count, to, |bytes| $convert(<$type>::from_be_bytes(bytes)));
             } else {
-                to.extend(bytes.chunks(run.stride.max(1) as usize).take(count).map(|bytes| convert(of(bytes))));
+                spaced::<WIDTH>(run.stride, bytes, count, to, |bytes| $convert(<$type>::from_le_bytes(bytes)));
             }
         }};
     }
@@ -273,15 +268,33 @@ fn append(run: &Run, bytes: &[u8], count: usize, to: &mut Vec<f64>) {
         Kind::I64 | Kind::Time => each!(i64, |code: i64| code as f64),
         Kind::F16 => each!(u16, half),
         Kind::I24 => {
-            let of = |bytes: &[u8]| match *bytes {
-                [high, middle, low, ..] if run.is_big_endian => [low, middle, high],
-                [low, middle, high, ..] => [low, middle, high],
-                _ => [0; 3],
-            };
             let convert = |[low, middle, high]: [u8; 3]| f64::from(i32::from_le_bytes([0, low, middle, high]) >> 8);
-            to.extend(bytes.chunks(run.stride as usize).take(count).map(|bytes| convert(of(bytes))));
+            if run.is_big_endian {
+                spaced(run.stride, bytes, count, to, |[high, middle, low]| convert([low, middle, high]));
+            } else {
+                spaced(run.stride, bytes, count, to, convert);
+            }
         }
     }
+}
+
+/// Appends so many numbers, one at each stride; behind the last there is nothing.
+fn spaced<const WIDTH: usize>(
+    stride: u64,
+    bytes: &[u8],
+    count: usize,
+    to: &mut Vec<f64>,
+    convert: impl Fn([u8; WIDTH]) -> f64,
+) {
+    let of = |bytes: &[u8]| convert(bytes.first_chunk().copied().unwrap_or([0; WIDTH]));
+    if stride == WIDTH as u64 {
+        to.extend(bytes.as_chunks().0.iter().map(|bytes| convert(*bytes)));
+        return;
+    }
+    let whole = bytes.chunks_exact(stride as usize);
+    let last = (whole.len() < count).then(|| of(whole.remainder()));
+    to.extend(whole.take(count).map(of));
+    to.extend(last);
 }
 
 /// A number of 16 bits (IEEE 754, binary16).

@@ -156,28 +156,64 @@ static SHUFFLES: [[[u8; WINDOW]; WINDOW]; WINDOW] = {
 /// A number of any length, digit by digit.
 #[inline(never)]
 fn one_by_one(bytes: &[u8], decimal: u8) -> Option<(f64, usize)> {
-    let begin = usize::from(bytes.first() == Some(&b'-'));
-    let mut place = begin;
-    let mut digits: u64 = 0;
-    let mut separator = None;
-    while let Some(&byte) = bytes.get(place) {
-        let digit = byte.wrapping_sub(b'0');
-        if digit < 10 {
-            digits = digits.wrapping_mul(10).wrapping_add(u64::from(digit));
-        } else if byte == decimal && separator.is_none() {
-            separator = Some(place);
-        } else {
-            break;
+    let digits = Digits::leading(bytes, decimal)?;
+    Some((digits.scaled(0)?, digits.length))
+}
+
+/// The digits of a number, read one by one.
+struct Digits {
+    is_negative: bool,
+    /// All of them, as a whole number up to 2^53, and how many are behind the decimal mark.
+    whole: u64,
+    fraction: u8,
+    /// Characters, sign and mark included.
+    length: usize,
+}
+
+impl Digits {
+    fn leading(bytes: &[u8], decimal: u8) -> Option<Self> {
+        let is_negative = bytes.first() == Some(&b'-');
+        let begin = usize::from(is_negative);
+        let mut place = begin;
+        let mut whole: u64 = 0;
+        let mut separator = None;
+        while let Some(&byte) = bytes.get(place) {
+            let digit = byte.wrapping_sub(b'0');
+            if digit < 10 {
+                whole = whole.wrapping_mul(10).wrapping_add(u64::from(digit));
+            } else if byte == decimal && separator.is_none() {
+                separator = Some(place);
+            } else {
+                break;
+            }
+            place += 1;
         }
-        place += 1;
+        let count = place - begin - usize::from(separator.is_some());
+        let fraction = separator.map_or(0, |separator| place - separator - 1);
+        // 19 digits never overflow 64 bits.
+        let is_exact = count > 0 && count <= 19 && whole <= EXACT_WHOLE;
+        is_exact.then_some(Self { is_negative, whole, fraction: fraction as u8, length: place })
     }
-    let count = place - begin - usize::from(separator.is_some());
-    let fraction = separator.map_or(0, |separator| place - separator - 1);
-    // 19 digits never overflow 64 bits.
-    if count == 0 || count > 19 || digits > EXACT_WHOLE {
-        return None;
+
+    /// Their number times ten to this power; `None` where the power in all is not exact.
+    fn scaled(&self, exponent: i32) -> Option<f64> {
+        let power = exponent - i32::from(self.fraction);
+        let factor = EXACT_POWERS[usize::from(self.is_negative)].get(power.unsigned_abs() as usize)?;
+        let whole = self.whole as f64;
+        Some(if power < 0 { whole / factor } else { whole * factor })
     }
-    Some((digits as f64 / EXACT_POWERS[begin][fraction], place))
+}
+
+/// The exponent of a number, `e-07`, or none; `None` of other characters.
+fn exponent(rest: &[u8]) -> Option<i32> {
+    let (sign, digits) = match rest {
+        [] => return Some(0),
+        [b'e' | b'E', b'-', digits @ ..] => (-1, digits),
+        [b'e' | b'E', b'+', digits @ ..] | [b'e' | b'E', digits @ ..] => (1, digits),
+        _ => return None,
+    };
+    let is_short = (1..=3).contains(&digits.len()) && digits.iter().all(u8::is_ascii_digit);
+    is_short.then(|| sign * digits.iter().fold(0, |all, digit| 10 * all + i32::from(digit - b'0')))
 }
 
 /// The number of a whole cell with `.` or `,` as its decimal mark; NaN where it is empty, `None` where it holds none.
@@ -186,7 +222,12 @@ pub fn parse_number(cell: &[u8], decimal: u8) -> Option<f64> {
     if cell.is_empty() {
         return Some(f64::NAN);
     }
-    if let Some((value, _)) = leading(Eights, cell, decimal).filter(|(_, length)| *length == cell.len()) {
+    let at_once = cell.first_chunk().and_then(|window| Eights.at_once(window, decimal));
+    if let Some((value, _)) = at_once.filter(|(_, length)| *length == cell.len()) {
+        return Some(value);
+    }
+    let digits = Digits::leading(cell, decimal);
+    if let Some(value) = digits.and_then(|digits| digits.scaled(exponent(&cell[digits.length..])?)) {
         return Some(value);
     }
     let text = std::str::from_utf8(cell).ok()?;
@@ -236,6 +277,13 @@ mod tests {
             "1234567890123456789012",
             "0.0000000000000000000000001",
             "8.442911973260991817129021e-309",
+            "-4.57865206332e-01",
+            "1.5E+22",
+            "1.5e+24",
+            "-123.25e2",
+            "9007199254740993e-30",
+            "2.5e-0000007",
+            "-0e5",
             "inf",
             "-inf",
             "00012.50",
@@ -271,6 +319,9 @@ mod tests {
             let text = format!("{value:.places$}");
             let expected: f64 = text.parse().unwrap();
             assert_eq!(parse_number(text.as_bytes(), b'.').unwrap().to_bits(), expected.to_bits(), "{text}");
+            let text_e = format!("{value:.places$e}");
+            let expected_e: f64 = text_e.parse().unwrap();
+            assert_eq!(parse_number(text_e.as_bytes(), b'.').unwrap().to_bits(), expected_e.to_bits(), "{text_e}");
             for (found, length) in every_way(format!("{text},-12345678").as_bytes(), b'.').into_iter().flatten() {
                 assert_eq!((found.to_bits(), length), (expected.to_bits(), text.len()), "{text} in a line");
             }
@@ -279,7 +330,9 @@ mod tests {
 
     #[test]
     fn what_is_no_number_is_refused() {
-        for text in ["abc", "1.2.3", "1,5", "--1", "-", ".", "1 2", "0x10", "1e", "µ", "12abc", "1_000"] {
+        for text in [
+            "abc", "1.2.3", "1,5", "--1", "-", ".", "1 2", "0x10", "1e", "1e+", "1e-2.5", "1e5x", "µ", "12abc", "1_000",
+        ] {
             assert_eq!(parse_number(text.as_bytes(), b'.'), None, "{text}");
         }
         for text in ["1.5", "1.234,5", "1,2,3", ","] {

@@ -12,36 +12,15 @@ use std::{
     io::{self, Write},
 };
 
-use runout_core::{
-    fault::Fault,
-    pipeline::{Context, Plugin, Registry, StageConfig},
-    stage::Exporter,
-};
-use runout_mesh::{Format, Mesh, MeshConfig, Notes};
-use schemars::JsonSchema;
-use serde::Deserialize;
+use runout_core::pipeline::Registry;
+use runout_mesh::{Format, Mesh, Notes};
 
 use vertices::Layout;
 
-/// The exporter `gltf`.
-#[derive(Debug, Clone, Deserialize, JsonSchema)]
-#[serde(transparent)]
-pub struct GltfConfig(MeshConfig);
-
-impl StageConfig for GltfConfig {
-    type Stage = Box<dyn Exporter>;
-
-    const NAME: &'static str = "gltf";
-    const ABOUT: &'static str = "writes the surface as a glTF binary mesh, coloured by deviation";
-
-    fn check(self, context: &Context) -> Result<Self::Stage, Fault> {
-        self.0.check(context, Format { extension: "glb", unit: "m", write })
-    }
-}
-
 /// Adds the exporter `gltf`.
 pub fn register(registry: &mut Registry) {
-    registry.exporters.add(Plugin::of::<GltfConfig>());
+    let about = "writes the surface as a glTF binary mesh, coloured by deviation";
+    Format { name: "gltf", about, extension: "glb", unit: "m", write }.register(registry);
 }
 
 /// Writes a GLB: header, JSON chunk, binary chunk (glTF 2.0 specification, 4.4).

@@ -45,20 +45,27 @@ impl Kind {
 
     /// The number at the start of these bytes; NaN where they are too few.
     pub(crate) fn decode(self, bytes: &[u8]) -> f64 {
-        fn first<const N: usize>(bytes: &[u8]) -> Option<[u8; N]> {
-            bytes.first_chunk::<N>().copied()
+        let mut number = Vec::with_capacity(1);
+        self.append(bytes, bytes.len().max(1), &mut number);
+        number.pop().unwrap_or(f64::NAN)
+    }
+
+    /// Appends the numbers at the starts of records of so many bytes.
+    pub(crate) fn append(self, bytes: &[u8], record: usize, to: &mut Vec<f64>) {
+        fn each<const N: usize>(bytes: &[u8], record: usize, to: &mut Vec<f64>, number: impl Fn([u8; N]) -> f64) {
+            let one = |bytes: &[u8]| bytes.first_chunk().map_or(f64::NAN, |bytes| number(*bytes));
+            to.extend(bytes.chunks(record).map(one));
         }
-        let number = match self {
-            Self::U8 => first(bytes).map(|bytes| f64::from(u8::from_le_bytes(bytes))),
-            Self::U16 => first(bytes).map(|bytes| f64::from(u16::from_le_bytes(bytes))),
-            Self::U32 => first(bytes).map(|bytes| f64::from(u32::from_le_bytes(bytes))),
-            Self::I8 => first(bytes).map(|bytes| f64::from(i8::from_le_bytes(bytes))),
-            Self::I16 => first(bytes).map(|bytes| f64::from(i16::from_le_bytes(bytes))),
-            Self::I32 => first(bytes).map(|bytes| f64::from(i32::from_le_bytes(bytes))),
-            Self::F32 => first(bytes).map(|bytes| f64::from(f32::from_le_bytes(bytes))),
-            Self::F64 => first(bytes).map(f64::from_le_bytes),
-        };
-        number.unwrap_or(f64::NAN)
+        match self {
+            Self::U8 => each(bytes, record, to, |bytes| f64::from(u8::from_le_bytes(bytes))),
+            Self::U16 => each(bytes, record, to, |bytes| f64::from(u16::from_le_bytes(bytes))),
+            Self::U32 => each(bytes, record, to, |bytes| f64::from(u32::from_le_bytes(bytes))),
+            Self::I8 => each(bytes, record, to, |bytes| f64::from(i8::from_le_bytes(bytes))),
+            Self::I16 => each(bytes, record, to, |bytes| f64::from(i16::from_le_bytes(bytes))),
+            Self::I32 => each(bytes, record, to, |bytes| f64::from(i32::from_le_bytes(bytes))),
+            Self::F32 => each(bytes, record, to, |bytes| f64::from(f32::from_le_bytes(bytes))),
+            Self::F64 => each(bytes, record, to, f64::from_le_bytes),
+        }
     }
 }
 
@@ -68,11 +75,11 @@ impl Kind {
 /// When the file ends before.
 pub(crate) fn read(source: &mut impl Read, kind: Kind, count: usize) -> io::Result<Vec<f64>> {
     let mut numbers = Vec::new();
-    records(source, kind.size(), count, |record| numbers.push(kind.decode(record)))?;
+    records(source, kind.size(), count, |records| kind.append(records, kind.size(), &mut numbers))?;
     Ok(numbers)
 }
 
-/// Gives records of so many bytes one after the other.
+/// Gives records of so many bytes, a block of them at a time.
 ///
 /// # Errors
 /// When the file ends before.
@@ -89,7 +96,7 @@ pub(crate) fn records(
         let now = left.min(at_once);
         let part = &mut block[..now * size];
         source.read_exact(part)?;
-        part.chunks_exact(size).for_each(&mut each);
+        each(part);
         left -= now;
     }
     Ok(())

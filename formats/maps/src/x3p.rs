@@ -28,6 +28,9 @@ pub(crate) use write::write;
 /// Largest `main.xml`: 200 million points of 20 letters.
 const MOST_XML: u64 = 4 << 30;
 
+/// Packed bytes that are read at a time: a packed block is unpacked in few pieces.
+const PACKED: usize = 1 << 16;
+
 /// Whether these first bytes are those of a ZIP archive.
 pub(crate) fn is_one(start: &[u8]) -> bool {
     start.starts_with(b"PK\x03\x04")
@@ -44,7 +47,7 @@ pub(crate) fn is_in(input: &Input) -> Result<bool> {
 }
 
 fn opened(input: &Input) -> Result<Archive> {
-    let archive = ZipArchive::new(BufReader::new(input.open()?));
+    let archive = ZipArchive::new(BufReader::with_capacity(PACKED, input.open()?));
     archive.map_err(|error| {
         failed(&input.shown, error).help("the archive is cut or damaged: copy the file again from where it was written")
     })
@@ -110,12 +113,12 @@ fn linked(
     let mut columns: Vec<Vec<f64>> = kinds.iter().map(|_| Vec::new()).collect();
     {
         let file = archive.by_name(&name).map_err(|error| failed(shown, error))?;
-        let mut file = Hashed { file: BufReader::new(file), hash: document.checksum.as_ref().map(|_| Md5::new()) };
+        let mut file = Hashed { file, hash: document.checksum.as_ref().map(|_| Md5::new()) };
         numbers::skip(&mut file, layer as u64 * count as u64 * record as u64).map_err(io)?;
-        numbers::records(&mut file, record, count, |bytes| {
+        numbers::records(&mut file, record, count, |records| {
             let mut place = 0;
             for (column, kind) in columns.iter_mut().zip(&kinds) {
-                column.push(kind.decode(&bytes[place..]));
+                kind.append(&records[place..], record, column);
                 place += kind.size();
             }
         })
@@ -134,15 +137,15 @@ fn linked(
         let first = layer as u64 * count as u64;
         numbers::skip(&mut file, first / 8).map_err(io)?;
         let from = (first % 8) as usize;
-        let mut bit = 0_usize;
-        numbers::records(&mut file, 1, (from + count).div_ceil(8), |byte| {
-            for place in 0..8_usize {
-                let point = (8 * bit + place).wrapping_sub(from);
-                if point < count && byte[0] >> place & 1 == 0 {
+        let mut bits = 0_usize;
+        numbers::records(&mut file, 1, (from + count).div_ceil(8), |bytes| {
+            for bit in 0..8 * bytes.len() {
+                let point = (bits + bit).wrapping_sub(from);
+                if point < count && bytes[bit / 8] >> (bit % 8) & 1 == 0 {
                     columns.iter_mut().for_each(|column| column[point] = f64::NAN);
                 }
             }
-            bit += 1;
+            bits += 8 * bytes.len();
         })
         .map_err(io)?;
     }

@@ -5,10 +5,10 @@ use std::path::PathBuf;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-/// Keys of every mesh exporter. A format wraps them in a type of its own.
+/// Keys of every mesh exporter.
 #[derive(Debug, Clone, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct MeshConfig {
+pub(crate) struct MeshConfig {
     /// The file to write; the mesh in it is at true scale.
     pub path: PathBuf,
     /// Also writes a second file beside it, `NAME-x1000` for 1000, with the deviations from the nominal radius, or the

@@ -28,7 +28,7 @@ impl MeshConfig {
     ///
     /// # Errors
     /// The first value that cannot be.
-    pub fn check(self, context: &Context, format: Format) -> std::result::Result<Box<dyn Exporter>, Fault> {
+    pub(crate) fn check(self, context: &Context, format: Format) -> std::result::Result<Box<dyn Exporter>, Fault> {
         let fits = self.path.extension().is_some_and(|found| found.eq_ignore_ascii_case(format.extension));
         if !fits {
             let message =

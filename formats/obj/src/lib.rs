@@ -10,38 +10,15 @@ use std::{
     io::{self, Write},
 };
 
-use runout_core::{
-    fault::Fault,
-    pipeline::{Context, Plugin, Registry, StageConfig},
-    stage::Exporter,
-};
-use runout_mesh::{
-    COLOUR_STEPS, Cap, Format, Mesh, MeshConfig, Notes, UNMEASURED, Wall, in_order, palette, processors,
-};
-use schemars::JsonSchema;
-use serde::Deserialize;
+use runout_core::pipeline::Registry;
+use runout_mesh::{COLOUR_STEPS, Cap, Format, Mesh, Notes, UNMEASURED, Wall, in_order, palette, processors};
 
 use text::Text;
 
-/// The exporter `obj`.
-#[derive(Debug, Clone, Deserialize, JsonSchema)]
-#[serde(transparent)]
-pub struct ObjConfig(MeshConfig);
-
-impl StageConfig for ObjConfig {
-    type Stage = Box<dyn Exporter>;
-
-    const NAME: &'static str = "obj";
-    const ABOUT: &'static str = "writes the surface as a Wavefront OBJ mesh in mm, coloured by deviation";
-
-    fn check(self, context: &Context) -> Result<Self::Stage, Fault> {
-        self.0.check(context, Format { extension: "obj", unit: "mm", write })
-    }
-}
-
 /// Adds the exporter `obj`.
 pub fn register(registry: &mut Registry) {
-    registry.exporters.add(Plugin::of::<ObjConfig>());
+    let about = "writes the surface as a Wavefront OBJ mesh in mm, coloured by deviation";
+    Format { name: "obj", about, extension: "obj", unit: "mm", write }.register(registry);
 }
 
 /// Rings that one thread writes out at a time: a megabyte of text with 2560 angles.

@@ -17,7 +17,7 @@ use runout_core::{
     table::{ArrayRef, RecordBatch, TableSpec, stretches},
 };
 
-use crate::{Parquet, table::TableFile};
+use crate::{Parquet, ParquetFile, table::TableFile};
 
 /// The folder of the summaries, and the file of each.
 const SUMMARIES: &str = "summaries";
@@ -162,7 +162,7 @@ impl Gathered for GatheredTable {
 /// Gives the rows of a file, some at a time.
 fn each(path: &Path, take: &mut dyn FnMut(&RecordBatch) -> Result<()>) -> Result<()> {
     let shown = || path.display().to_string();
-    let file = File::open(path).map_err(|error| Error::caused("read", shown(), error))?;
+    let file = File::open(path).and_then(ParquetFile::new).map_err(|error| Error::caused("read", shown(), error))?;
     let damaged = |error: parquet::errors::ParquetError| {
         Error::caused("read", shown(), error).of(ErrorKind::DamagedData).help("delete it and run the batch again")
     };

@@ -7,6 +7,7 @@
 mod about;
 mod comparison;
 mod data_set;
+mod file;
 mod table;
 
 use std::path::PathBuf;
@@ -25,6 +26,7 @@ use serde::Deserialize;
 pub use comparison::{ComparisonTable, comparison_figures, comparison_rows, comparison_table};
 pub use data_set::DataSet;
 use data_set::Partition;
+pub use file::ParquetFile;
 use table::TableFile;
 
 /// Adds the exporter `parquet`.

@@ -9,34 +9,13 @@ use std::{
     io::{self, BufWriter, Write},
 };
 
-use runout_core::{
-    fault::Fault,
-    pipeline::{Context, Plugin, Registry, StageConfig},
-    stage::Exporter,
-};
-use runout_mesh::{Format, Mesh, MeshConfig, Notes, UNMEASURED, palette};
-use schemars::JsonSchema;
-use serde::Deserialize;
-
-/// The exporter `ply`.
-#[derive(Debug, Clone, Deserialize, JsonSchema)]
-#[serde(transparent)]
-pub struct PlyConfig(MeshConfig);
-
-impl StageConfig for PlyConfig {
-    type Stage = Box<dyn Exporter>;
-
-    const NAME: &'static str = "ply";
-    const ABOUT: &'static str = "writes the surface as a PLY mesh in mm, with colour and the deviation as quality";
-
-    fn check(self, context: &Context) -> Result<Self::Stage, Fault> {
-        self.0.check(context, Format { extension: "ply", unit: "mm", write })
-    }
-}
+use runout_core::pipeline::Registry;
+use runout_mesh::{Format, Mesh, Notes, UNMEASURED, palette};
 
 /// Adds the exporter `ply`.
 pub fn register(registry: &mut Registry) {
-    registry.exporters.add(Plugin::of::<PlyConfig>());
+    let about = "writes the surface as a PLY mesh in mm, with colour and the deviation as quality";
+    Format { name: "ply", about, extension: "ply", unit: "mm", write }.register(registry);
 }
 
 fn write(mesh: &Mesh, notes: &Notes, file: &mut File) -> io::Result<()> {

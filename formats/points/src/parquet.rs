@@ -11,12 +11,13 @@ use arrow_array::{
 use arrow_schema::DataType;
 use parquet::arrow::arrow_reader::{ArrowReaderOptions, ParquetRecordBatchReaderBuilder};
 use runout_core::{Error, Result, input_file::InputFile};
+use runout_parquet::ParquetFile;
 
 use crate::{RawColumn, RawTable, failed};
 
 pub(crate) fn read(input: &InputFile) -> Result<RawTable> {
     let shown = input.path().display().to_string();
-    let file = input.open()?;
+    let file = ParquetFile::new(input.open()?).map_err(|error| Error::caused("read", &shown, error))?;
     // The types of Parquet itself, so that dictionaries of another program are plain texts.
     let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
     let builder =

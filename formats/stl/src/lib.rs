@@ -9,34 +9,13 @@ use std::{
     io::{self, BufWriter, Write},
 };
 
-use runout_core::{
-    fault::Fault,
-    pipeline::{Context, Plugin, Registry, StageConfig},
-    stage::Exporter,
-};
-use runout_mesh::{Format, Mesh, MeshConfig, Notes};
-use schemars::JsonSchema;
-use serde::Deserialize;
-
-/// The exporter `stl`.
-#[derive(Debug, Clone, Deserialize, JsonSchema)]
-#[serde(transparent)]
-pub struct StlConfig(MeshConfig);
-
-impl StageConfig for StlConfig {
-    type Stage = Box<dyn Exporter>;
-
-    const NAME: &'static str = "stl";
-    const ABOUT: &'static str = "writes the surface as a binary STL mesh in mm, without colours";
-
-    fn check(self, context: &Context) -> Result<Self::Stage, Fault> {
-        self.0.check(context, Format { extension: "stl", unit: "mm", write })
-    }
-}
+use runout_core::pipeline::Registry;
+use runout_mesh::{Format, Mesh, Notes};
 
 /// Adds the exporter `stl`.
 pub fn register(registry: &mut Registry) {
-    registry.exporters.add(Plugin::of::<StlConfig>());
+    let about = "writes the surface as a binary STL mesh in mm, without colours";
+    Format { name: "stl", about, extension: "stl", unit: "mm", write }.register(registry);
 }
 
 /// Bytes of the text at the beginning.

@@ -21,6 +21,7 @@ use arrow_ipc::{reader::StreamReader, root_as_message};
 use arrow_schema::{ArrowError, DataType, Field, SchemaRef, TimeUnit};
 use parquet::arrow::{ProjectionMask, arrow_reader::ParquetRecordBatchReaderBuilder};
 use runout_core::{Error, ErrorKind, Result, input_file::InputFile};
+use runout_parquet::ParquetFile;
 
 use super::Format;
 use crate::{
@@ -98,7 +99,7 @@ impl Table {
         table.origins = vec![0; schema.fields().len()];
         let rows = if container == Container::Parquet {
             let file = input.open()?;
-            let builder = guarded(&shown, || Ok(ParquetRecordBatchReaderBuilder::try_new(file)?))?;
+            let builder = guarded(&shown, || Ok(ParquetRecordBatchReaderBuilder::try_new(ParquetFile::new(file)?)?))?;
             builder.metadata().file_metadata().num_rows().max(0) as u64
         } else {
             stated
@@ -139,7 +140,7 @@ impl Table {
         guarded(&shown, || {
             Ok(match self.container {
                 Container::Parquet => {
-                    let builder = ParquetRecordBatchReaderBuilder::try_new(file)?;
+                    let builder = ParquetRecordBatchReaderBuilder::try_new(ParquetFile::new(file)?)?;
                     let mask = ProjectionMask::roots(builder.parquet_schema(), columns.iter().copied());
                     Box::new(builder.with_projection(mask).with_batch_size(most).build()?) as Batches
                 }
@@ -158,7 +159,7 @@ fn next(batches: &mut Batches, shown: &str) -> Result<Option<RecordBatch>> {
 
 fn schema(file: File, container: Container) -> std::result::Result<SchemaRef, ArrowError> {
     Ok(match container {
-        Container::Parquet => Arc::clone(ParquetRecordBatchReaderBuilder::try_new(file)?.schema()),
+        Container::Parquet => Arc::clone(ParquetRecordBatchReaderBuilder::try_new(ParquetFile::new(file)?)?.schema()),
         Container::Ipc { begin } => StreamReader::try_new(stream(file, begin)?, None)?.schema(),
     })
 }

@@ -1,6 +1,7 @@
 //! Universal files, dataset 58: functions at degrees of freedom, as text or binary (58b) (SDRC, Universal File Datasets).
 
 use runout_core::{Result, clock::ClockScan, input_file::InputFile};
+use runout_csv::parse_number;
 
 use super::Format;
 use crate::{
@@ -211,7 +212,8 @@ impl Uff {
                 let mut bytes = Bytes::open(&(&self.input).into())?;
                 bytes.seek(*data)?;
                 let (widths, numbers) = (widths.clone(), numbers.to_vec());
-                Ok(Box::new(TextSamples { bytes, widths, numbers, left: *points, rest: Vec::new() }))
+                let (line, found, rest) = (Vec::new(), Vec::new(), Vec::new());
+                Ok(Box::new(TextSamples { bytes, widths, numbers, left: *points, line, found, rest }))
             }
             Layout::Binary { kinds, is_big_endian } => {
                 let width: usize = kinds.iter().map(|kind| kind.bytes()).sum();
@@ -321,12 +323,8 @@ fn begin_of_data(bytes: &mut Bytes, length: u64) -> Result<u64> {
 
 /// Counts the points of data as text, and goes behind the mark at their end.
 fn count(bytes: &mut Bytes, widths: &[usize]) -> Result<u64> {
-    let mut values = 0;
-    let mut numbers = Vec::new();
-    while let Some(line) = bytes.line(LONGEST_LINE)? {
-        if is_mark(&line) {
-            break;
-        }
+    let (mut values, mut line, mut numbers) = (0, Vec::new(), Vec::new());
+    while bytes.line_into(&mut line, LONGEST_LINE)? && !is_mark(&line) {
         if !parsed(&line, widths, &mut numbers) {
             return Err(bytes.damaged(format!("expected numbers, found `{}`", text(&line))));
         }
@@ -356,18 +354,20 @@ fn parsed(line: &[u8], widths: &[usize], numbers: &mut Vec<f64>) -> bool {
 
 /// A number, also with the exponent of double precision of Fortran.
 fn number(word: &[u8]) -> Option<f64> {
-    let text = std::str::from_utf8(word).ok()?;
-    text.parse().ok().or_else(|| text.replace(['D', 'd'], "E").parse().ok())
+    let with_e = || String::from_utf8_lossy(word).replace(['D', 'd'], "E");
+    let value = parse_number(word, b'.').or_else(|| parse_number(with_e().as_bytes(), b'.'));
+    value.filter(|_| !word.is_empty())
 }
 
 /// Points as text.
 struct TextSamples {
     bytes: Bytes,
     widths: Vec<usize>,
-    /// Which numbers of a point are read.
     numbers: Vec<usize>,
     /// Points that are still to be read.
     left: u64,
+    line: Vec<u8>,
+    found: Vec<f64>,
     /// Numbers of a point that goes on in the next line.
     rest: Vec<f64>,
 }
@@ -375,7 +375,6 @@ struct TextSamples {
 impl Samples for TextSamples {
     fn next(&mut self, most: usize, columns: &mut [Vec<f64>]) -> Result<usize> {
         let (width, mut taken) = (self.widths.len(), 0);
-        let mut line_numbers = Vec::new();
         loop {
             let whole = (self.rest.len() / width).min(most - taken).min(self.left as usize);
             for point in self.rest.chunks_exact(width).take(whole) {
@@ -389,11 +388,13 @@ impl Samples for TextSamples {
             if taken == most || self.left == 0 {
                 return Ok(taken);
             }
-            let Some(line) = self.bytes.line(LONGEST_LINE)?.filter(|line| !is_mark(line)) else { return Ok(taken) };
-            if !parsed(&line, &self.widths, &mut line_numbers) {
+            if !self.bytes.line_into(&mut self.line, LONGEST_LINE)? || is_mark(&self.line) {
+                return Ok(taken);
+            }
+            if !parsed(&self.line, &self.widths, &mut self.found) {
                 return Err(self.bytes.damaged("expected numbers"));
             }
-            self.rest.extend_from_slice(&line_numbers);
+            self.rest.extend_from_slice(&self.found);
         }
     }
 }
