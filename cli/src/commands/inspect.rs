@@ -4,6 +4,7 @@ use std::{fs::File, io::Read, path::Path};
 
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use runout_core::{Error, ErrorKind, Result, atomic_file::complete_publication, input_file::open_regular};
+use runout_parquet::ParquetFile;
 
 use super::print;
 use crate::{
@@ -81,7 +82,7 @@ const ARROW_SCHEMA: &str = "ARROW:schema";
 
 fn table(path: &Path) -> Result<TableReport> {
     let shown = path.display().to_string();
-    let file = File::open(path).map_err(|error| Error::caused("inspect", &shown, error))?;
+    let file = File::open(path).and_then(ParquetFile::new).map_err(|error| Error::caused("inspect", &shown, error))?;
     let reader = SerializedFileReader::new(file)
         .map_err(|error| Error::caused("inspect", &shown, error).of(ErrorKind::DamagedData))?;
     let metadata = reader.metadata();
