@@ -53,21 +53,13 @@ impl Diagnosis {
         self.warnings.iter().filter(|warning| !self.notes.contains(warning))
     }
 
-    /// The verdict in one sentence with what refutes the final model, and the confounded sets that the data do not decide.
+    /// The verdict in one sentence, with what refutes the final model where that is asked for, and the confounded sets that the data do not decide.
     #[must_use]
-    pub fn headline(&self) -> String {
-        self.with_sets(&refuted_by(&self.consistency).map(|said| format!(": {said}")).unwrap_or_default())
-    }
-
-    /// The same without what refutes the final model.
-    #[must_use]
-    pub fn outcome(&self) -> String {
-        self.with_sets("")
-    }
-
-    fn with_sets(&self, refuted: &str) -> String {
+    pub fn headline(&self, with_findings: bool) -> String {
         let undecided = self.added.iter().filter(|one| !one.confounded_with.is_empty());
         let sets: Vec<String> = undecided.map(Added::members).collect();
+        let refuted = refuted_by(&self.consistency).filter(|_| with_findings);
+        let refuted = refuted.map(|said| format!(": {said}")).unwrap_or_default();
         let verdict = format!("{}{refuted}", self.in_words());
         if sets.is_empty() { verdict } else { format!("{verdict}. Not decided: {}", sets.join("; ")) }
     }
@@ -110,7 +102,7 @@ pub enum Verdict {
 }
 
 impl Verdict {
-    /// The verdict of the same final model, reached from a declaration that something was added to.
+    /// That of the same final model with something added to the declared one.
     #[must_use]
     pub fn with_addition(self) -> Self {
         match self {

@@ -104,6 +104,14 @@ pub struct PlacedValue<'a> {
     pub value: &'a Value,
 }
 
+impl<'a> PlacedValue<'a> {
+    /// A domain's own value, with what it is of.
+    #[must_use]
+    pub fn own((of, value): &'a (Option<&'a str>, Value)) -> Self {
+        Self { station: None, section: *of, z_mm: None, value }
+    }
+}
+
 /// A value of a result.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[non_exhaustive]

@@ -69,6 +69,11 @@ impl Summary {
         all
     }
 
+    /// A domain's own values as those that limits name, with what each is of.
+    pub(crate) fn own_values(&self) -> Vec<(Option<&str>, Value)> {
+        self.values.iter().filter_map(|value| Some((value.of.as_deref(), value.own()?))).collect()
+    }
+
     /// Marks the values of the whole part, where the data of one of its stations refute what is said of them.
     pub(crate) fn refute_part(&mut self) {
         let Some(by) = refuted_by(&self.consistency) else { return };

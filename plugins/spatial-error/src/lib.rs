@@ -26,7 +26,6 @@ mod query;
 mod remarks;
 mod residual;
 mod rough;
-mod searched;
 mod separate;
 mod shapes;
 pub mod simulate;

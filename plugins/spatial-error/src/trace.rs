@@ -3,7 +3,10 @@
 //! A covariance that was estimated without an effect has taken a part of it for field. Evidence with this covariance held would be
 //! wrong by any amount, so it only lists what is tried.
 
+mod searched;
+
 use runout_core::numerics::statistics::f_tail;
+use searched::{Sums, aliases};
 
 use crate::{
     campaign::Campaign,
@@ -12,7 +15,6 @@ use crate::{
     families::{Likely, most_likely},
     joint::Data,
     likelihood::{Criterion, Estimate, Prior, estimate},
-    searched::{Sums, aliases},
     shapes::Shape,
     solve::{estimated_from, independent},
     terms::Term,

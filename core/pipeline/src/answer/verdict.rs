@@ -55,7 +55,7 @@ fn of_loop(diagnosis: &Diagnosis, summary: &Summary) -> (String, Judgement) {
     };
     // What refutes values is said of them.
     let is_said = !summary.refuted().0.is_empty();
-    (if is_said { diagnosis.outcome() } else { diagnosis.headline() }, judgement)
+    (diagnosis.headline(!is_said), judgement)
 }
 
 /// What the tests of the data on themselves say.

@@ -19,9 +19,7 @@ use crate::{
 use runout_closed_loop::diagnosis::{self, Correction, Diagnosis};
 use runout_consistency::Check;
 use runout_error::{Error, Result};
-use runout_evaluate::{
-    self as values, Evaluate, Evaluated, EvaluatedStation, Group, PlacedValue, Value, height_grid::HeightGrid,
-};
+use runout_evaluate::{self as values, Evaluate, Evaluated, EvaluatedStation, Group, height_grid::HeightGrid};
 use runout_table::{TableRows, TableSpec};
 use runout_turning::{
     measurement::StationKey,
@@ -257,11 +255,9 @@ impl ResultWriter {
             self.summary.provenance.inputs.push(Input::of(file)?);
         }
         self.summary.refute_part();
-        let mut placed = self.summary.placed_values();
-        placed.extend(self.evaluated.placed());
-        let own: Vec<(Option<&str>, Value)> =
-            self.summary.values.iter().filter_map(|value| Some((value.of.as_deref(), value.own()?))).collect();
-        placed.extend(own.iter().map(|(of, value)| PlacedValue { station: None, section: *of, z_mm: None, value }));
+        let own = self.summary.own_values();
+        let own = self.evaluated.placed().chain(own.iter().map(values::PlacedValue::own));
+        let placed: Vec<_> = self.summary.placed_values().into_iter().chain(own).collect();
         let (limits, unmatched) = values::decide(self.evaluate.limits(), &placed);
         self.summary.limits = limits;
         self.gather_warnings(remarks.into_iter().chain(unmatched));

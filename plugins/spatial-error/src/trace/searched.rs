@@ -7,8 +7,9 @@ use crate::{
     effects::{Candidate, Missing, measured, missing},
     shapes::{Shape, frequency_step, times_near},
     terms::Term,
-    trace::{SAME_BIC, State, Tracing},
 };
+
+use super::{SAME_BIC, State, Tracing};
 
 /// Candidates whose gain is computed at once: products of all with each other are not needed.
 const AT_ONCE: usize = 40;
