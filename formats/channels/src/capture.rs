@@ -38,7 +38,7 @@ pub(crate) struct Place<'a> {
 }
 
 /// Sensors of which one ends before another by more than this share were not recorded at one rate.
-const UNLIKE_LENGTHS: f64 = 0.05;
+const UNLIKE_LENGTHS: f64 = 0.25;
 
 impl Place<'_> {
     /// What the configuration calls the setup in the file.
@@ -143,12 +143,12 @@ impl Place<'_> {
         if let Some(longer) = signals.iter().find(is_longer) {
             let all = longer.channel().samples;
             // One rate that is stated for channels of unlike length is that of one of them.
-            if longer.channel().rate_hz.is_none() && (all - samples) as f64 > UNLIKE_LENGTHS * samples as f64 {
+            if (all - samples) as f64 > UNLIKE_LENGTHS * samples as f64 {
                 let problem = format!(
-                    "it has {all} samples, where another sensor has {samples}: their rates look unlike, and the file states none"
+                    "it has {all} samples, where another sensor has {samples}: they were hardly recorded at the one rate that is stated"
                 );
                 return Err(longer.error(problem).of(ErrorKind::UnsuitableData).help(
-                    "give channels of one rate, or a file that states the rate of each channel (TDMS, WAV, UFF, HDF5 attributes, a time column for each)",
+                    "give channels of one rate, a file that states the rate of each (TDMS, WAV, UFF, attributes of HDF5), or cut the longer one",
                 ));
             }
             let more = all - samples;
