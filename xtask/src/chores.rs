@@ -21,12 +21,15 @@ pub(crate) fn test(foreign_readers: bool, complete: bool) -> Outcome {
     let nextest = answer("cargo-nextest", &["--version"]).is_some();
     let runner: &[&str] =
         if nextest { &["nextest", "run", "--workspace"] } else { &["test", "--workspace", "--all-targets"] };
-    // Packages are fetched while the compiler works.
+    // Packages are fetched, and links of the docs are checked, while the compiler works.
     let readers = std::thread::scope(|scope| {
         let readers = foreign_readers.then(|| {
             scope.spawn(|| {
                 let readers = Readers::install()?;
                 python::install_test_packages()?;
+                if complete {
+                    site::pages()?;
+                }
                 Outcome::Ok(readers)
             })
         });
@@ -51,7 +54,6 @@ pub(crate) fn test(foreign_readers: bool, complete: bool) -> Outcome {
     run_example(&program)?;
     let package = || if foreign_readers { python::test() } else { Ok(()) };
     if complete {
-        site::pages()?;
         // Each of them takes one processor.
         std::thread::scope(|scope| {
             let program = program.display().to_string();
