@@ -66,7 +66,7 @@ def _parted(table: Table, columns: list[str], rows: Mask) -> Iterator[tuple[str,
     names = list(zip(*(map(str, np.array(table[column], dtype=object)) for column in columns))) or [()] * len(table)
     of: dict[tuple[str, ...], list[int]] = {}
     for row in np.flatnonzero(rows):
-        of.setdefault(names[row], []).append(row)
+        of.setdefault(names[row], []).append(int(row))
     for key, found in of.items():
         mask = np.zeros(len(table), dtype=bool)
         mask[found] = True
@@ -82,7 +82,7 @@ def _label(table: Table, column: str) -> str:
 
 def _curves(axes: Any, kind: str, table: Table, drawing: dict[str, Any], rows: Mask, curve: str) -> bool:
     """Draws the values of one curve; whether it has a name."""
-    x = drawing.get("angle_deg") or drawing.get("x") or drawing.get("order")
+    x = str(next(drawing[key] for key in ("angle_deg", "x", "order") if key in drawing))
     along = table[x][rows]
     if kind == "Amplitudes":
         real, imaginary = (table[part][rows] for part in drawing["parts"])

@@ -121,7 +121,8 @@ class Points:
 
 def _column(given: Array, name: str) -> list[Any]:
     if isinstance(given, np.ma.MaskedArray):
-        given = given.astype(np.float64).filled(np.nan) if given.dtype.kind in "fiu" else given.filled(None)
+        masked: Any = given
+        given = masked.astype(np.float64).filled(np.nan) if masked.dtype.kind in "fiu" else masked.filled(None)
     array = np.asarray(given)
     if array.ndim != 1 or not len(array):
         raise ValueError(f"{name}: expected a column of at least one value, found the shape {array.shape}")

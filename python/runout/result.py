@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 from collections.abc import Iterator
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -188,10 +189,11 @@ def values(result: Result, symbol: str | None = None, **where: str) -> Any:
         "unit": [one.unit for one in found],
         "refuted_by": [one.facts.get("refuted_by") for one in found],
     }
+    frames: Any
     try:
-        import pandas as frames
+        frames = import_module("pandas")
     except ImportError:
-        import polars as frames
+        frames = import_module("polars")
     return frames.DataFrame(columns)
 
 
