@@ -9,6 +9,7 @@ use runout_closed_loop::{
     diagnosis::{Added, Step},
 };
 use runout_error::Result;
+use runout_numerics::statistics::chi2_tail;
 use runout_turning::{rig::Rig, separation::Separation};
 
 /// χ² per degree of freedom from which on a station contradicts itself.
@@ -62,13 +63,15 @@ pub(super) fn put_right(
         }
         exchange(stations, best.profile, best.pair);
         let profile = &stations[best.pair[0]].profiles[best.profile];
-        found.note(rig, profile.setup, best.pair.map(|station| names[station].as_str()), [before, Left::of_all(&left)]);
+        let levels = [before, Left::of_all(&left)];
+        found.note(rig, (profile.setup, best.tried), best.pair.map(|station| names[station].as_str()), levels);
     }
     Ok(found)
 }
 
 impl Exchanged {
-    fn note(&mut self, rig: &Rig, setup: usize, [one, other]: [&str; 2], [before, after]: [Left; 2]) {
+    /// What was found of so many exchanges tried.
+    fn note(&mut self, rig: &Rig, (setup, tried): (usize, usize), [one, other]: [&str; 2], [before, after]: [Left; 2]) {
         let setups = || rig.setups.iter().map(|setup| &setup.id);
         let id = &rig.setups[setup].id;
         // Of two setups, each may be the one that is named right.
@@ -83,8 +86,8 @@ impl Exchanged {
             residual_rms_um: Step { before: Some(before.rms_um), after: Some(after.rms_um) },
             held_out_rms_um: Step { before: None, after: None },
             held_out_expected_rms_um: None,
-            delta_bic: after.chi2() - before.chi2(),
-            p_value: 0.0,
+            delta_bic: after.chi2() - before.chi2() + before.dof.ln(),
+            p_value: (tried as f64 * chi2_tail(before.chi2() - after.chi2(), 1.0)).min(1.0),
         });
         self.advice.push(format!(
             "stations `{one}` and `{other}` are exchanged in setup `{id}`: exchange the names of the two recordings"
@@ -118,6 +121,8 @@ struct Exchange {
     after: [Left; 2],
     /// χ² that it takes away.
     gain: f64,
+    /// Exchanges that were tried.
+    tried: usize,
 }
 
 fn best_exchange(
@@ -129,11 +134,13 @@ fn best_exchange(
     tried.sort_by(|a, b| left[*b].chi2_per_dof.total_cmp(&left[*a].chi2_per_dof));
     tried.truncate(MOST_TRIED);
     let mut best: Option<Exchange> = None;
+    let mut count = 0;
     for (place, &one) in tried.iter().enumerate() {
         for &other in &tried[..place] {
             let pair = [one.min(other), one.max(other)];
             // Of two setups, the first is taken for the one that is named right.
             for profile in (0..stations[one].profiles.len().min(stations[other].profiles.len())).rev() {
+                count += 1;
                 exchange(stations, profile, pair);
                 let separated = pair.map(|station| separator.separate(&stations[station]));
                 exchange(stations, profile, pair);
@@ -143,12 +150,12 @@ fn best_exchange(
                 let gain = before.iter().map(Left::chi2).sum::<f64>() - after.iter().map(Left::chi2).sum::<f64>();
                 let more = best.as_ref().is_none_or(|best| gain > best.gain * (1.0 + SAME));
                 if share.min(other) < LEFT && share.max(other) <= 1.0 && more {
-                    best = Some(Exchange { profile, pair, after, gain });
+                    best = Some(Exchange { profile, pair, after, gain, tried: 0 });
                 }
             }
         }
     }
-    Ok(best)
+    Ok(best.map(|best| Exchange { tried: count, ..best }))
 }
 
 fn exchange(stations: &mut [Station], profile: usize, [one, other]: [usize; 2]) {
