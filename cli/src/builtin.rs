@@ -1,6 +1,6 @@
 //! The built-in plugins.
 
-use runout_core::pipeline::Registry;
+use runout_core::pipeline::{Registry, put_right};
 
 /// Every plugin that is compiled in.
 #[must_use]
@@ -36,5 +36,6 @@ pub fn registry() -> Registry {
     ] {
         register(&mut registry);
     }
+    put_right::mistakes().into_iter().for_each(|mistake| registry.effects.add(mistake));
     registry
 }

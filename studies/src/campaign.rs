@@ -4,10 +4,12 @@ use std::path::Path;
 
 use runout_core::{
     Complex64, Error, Result,
+    consistency::turns::PhaseCourse,
+    counted_turns::counted,
     inspection::Inspection,
     measurement::{Recording, StationTruth},
     numerics::fourier::Fourier,
-    pipeline::{Context, StageConfig},
+    pipeline::{Context, StageConfig, put_right::marks::recounted},
     profile::Profile,
     rig::{Rig, RigConfig, Rotation, SensorConfig, SetupConfig},
     separation::{Quantity, Separation},
@@ -45,6 +47,7 @@ pub fn four_sensors(setups: &[(f64, f64)]) -> RigConfig {
                 id: format!("k{}", index + 1),
                 part_deg: *part_deg,
                 sensors_deg: *sensors_deg,
+                ..SetupConfig::default()
             })
             .collect(),
     }
@@ -121,12 +124,15 @@ pub fn station_with_spread(
     let recording = simulator.spindle_recording();
     let averager = averager(samples_per_rev)?;
     let profile = |setup: usize| -> Result<Profile> {
-        let stream = recording.open(station, setup)?;
-        let recorded = stream.capture().marks.len().saturating_sub(1);
-        let trim = trim(recorded.saturating_sub(turns))?;
         let projection = projections.get(setup).and_then(Option::as_ref);
         let wanted = AverageRequest { hold_out: share, projection };
-        averager.average_requested(trim.attach(Box::new(Inspection::new(stream)))?, wanted)
+        let average = |counted_by: &[PhaseCourse]| {
+            let stream = counted_by.iter().fold(recording.open(station, setup)?, counted);
+            let recorded = stream.capture().marks.len().saturating_sub(1);
+            let trim = trim(recorded.saturating_sub(turns))?;
+            averager.average_requested(trim.attach(Box::new(Inspection::new(stream)))?, wanted)
+        };
+        Ok(recounted(average(&[])?, average))
     };
     let profiles: Result<Vec<Profile>> = (0..rig.setups.len()).map(profile).collect();
     let truth = recording.truth(station)?.unwrap_or_default();

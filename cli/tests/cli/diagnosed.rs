@@ -7,8 +7,8 @@ use serde_json::{Value, json};
 use crate::folder::Folder;
 
 /// Example 6: in setup `b` the part went back 0.34° off; simulated.
-const SCENARIO: &str = include_str!("../../../examples/06-closed-loop/scenario.toml");
-const PIPELINE: &str = include_str!("../../../examples/06-closed-loop/pipeline.toml");
+pub(crate) const SCENARIO: &str = include_str!("../../../examples/06-closed-loop/scenario.toml");
+pub(crate) const PIPELINE: &str = include_str!("../../../examples/06-closed-loop/pipeline.toml");
 const MORE_EXPORTS: &str = r#"
 [[export]]
 plugin = "hdf5"
@@ -25,7 +25,7 @@ fn campaign(more: &str) -> Folder {
     folder
 }
 
-fn document(folder: &Folder, arguments: &[&str]) -> Value {
+pub(crate) fn document(folder: &Folder, arguments: &[&str]) -> Value {
     let ran = folder.run(&[arguments, &["--json"]].concat());
     assert_eq!((ran.status, ran.stderr.as_str()), (0, ""), "{arguments:?}");
     serde_json::from_str(&ran.stdout).unwrap()
@@ -35,7 +35,7 @@ fn written(folder: &Folder, path: &str) -> Value {
     serde_json::from_slice(&fs::read(folder.path().join(path)).unwrap()).unwrap()
 }
 
-fn value<'a>(section: &'a Value, symbol: &str) -> &'a Value {
+pub(crate) fn value<'a>(section: &'a Value, symbol: &str) -> &'a Value {
     section["values"].as_array().unwrap().iter().find(|value| value["symbol"] == symbol).unwrap()
 }
 
@@ -245,46 +245,4 @@ fn a_known_effect_is_in_the_units_of_the_rig() {
         (&summary["effects"][0]["effect"], &summary["effects"][0]["known"]),
         (&json!("reversal-angle"), &json!(true))
     );
-}
-
-/// Five stations, of which two were recorded under each other's name in one setup.
-#[test]
-fn exchanged_stations_are_found_and_put_right() {
-    let sound = SCENARIO.split("[[effect]]").next().unwrap();
-    let scenario = sound.to_owned() + "[recording]\nstations = { count = 5, step_mm = 20 }\n";
-    let folder = Folder::with(&[("scenario.toml", &scenario), ("pipeline.toml", PIPELINE)]);
-    let simulated = folder.run(&["simulate", "scenario.toml", "--out", "campaign.h5"]);
-    assert_eq!(simulated.status, 0, "{}", simulated.stderr);
-    let as_named = document(&folder, &["diagnose", "pipeline.toml"]);
-    assert_eq!((&as_named["verdict"], &as_named["added"]), (&json!("at-noise-floor"), &json!([])));
-    let file = hdf5_metno::File::open_rw(folder.path().join("campaign.h5")).unwrap();
-    let setup = file.group("b").unwrap();
-    for part in ["samples", "index"] {
-        let [one, other] = ["s002", "s004"].map(|station| format!("{station}/{part}"));
-        setup.relink(&one, "held").unwrap();
-        setup.relink(&other, &one).unwrap();
-        setup.relink("held", &other).unwrap();
-    }
-    drop((setup, file));
-    let run = document(&folder, &["run", "pipeline.toml"]);
-    let diagnosis = document(&folder, &["diagnose", "pipeline.toml"]);
-    assert_eq!(diagnosis["verdict"], "explained");
-    let [added] = &diagnosis["added"].as_array().unwrap()[..] else { panic!("{:#}", diagnosis["added"]) };
-    assert_eq!((&added["effect"], &added["targets"]), (&json!("stations-exchanged"), &json!(["b", "s002", "s004"])));
-    assert_eq!(added["confounded_with"], json!([]));
-    let advice = diagnosis["warnings"].as_array().unwrap().iter();
-    let advice = advice.filter(|said| said.as_str().unwrap().contains("exchange the names of the two recordings"));
-    assert_eq!(advice.count(), 1);
-    // Before: what a run of the names says; after: what the right names give.
-    let moved = |diagnosis: &Value, station: &str| {
-        let all = diagnosis["moved"].as_array().unwrap().iter();
-        let section = format!("a@{station}");
-        all.clone().find(|moved| moved["value"] == "RONt" && moved["section"] == section).unwrap().clone()
-    };
-    for (station, name) in ["s001", "s002", "s003", "s004", "s005"].into_iter().enumerate() {
-        let (found, right) = (moved(&diagnosis, name), moved(&as_named, name));
-        assert_eq!(found["before"], value(&run["stations"][station]["sections"][0], "RONt")["value"], "{name}");
-        assert_eq!(found["after"], right["after"], "{name}");
-        assert_eq!(found["before"] != right["before"], name == "s002" || name == "s004", "{name}");
-    }
 }

@@ -18,6 +18,7 @@ mod odd_files;
 mod one_line;
 mod other_rigs;
 mod points;
+mod put_right;
 mod reading;
 mod remarks;
 mod report;

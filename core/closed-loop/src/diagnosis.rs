@@ -1,6 +1,6 @@
 //! What a closed loop found, for people and programs.
 
-use std::{collections::BTreeMap, fmt, path::PathBuf};
+use std::{collections::BTreeMap, path::PathBuf};
 
 use runout_consistency::{Check, refuted_by};
 use schemars::JsonSchema;
@@ -47,6 +47,9 @@ pub struct Diagnosis {
     pub outputs: Vec<PathBuf>,
 }
 
+const NO_UNCERTAINTY: &str =
+    "the parameters of the effects have no ±: something unexplained is left, and what it does to them is not known";
+
 impl Diagnosis {
     /// The warnings that are no notes: `--fail-on-warning` counts them.
     pub fn findings(&self) -> impl Iterator<Item = &String> {
@@ -62,6 +65,16 @@ impl Diagnosis {
         let refuted = refuted.map(|said| format!(": {said}")).unwrap_or_default();
         let verdict = format!("{}{refuted}", self.in_words());
         if sets.is_empty() { verdict } else { format!("{verdict}. Not decided: {}", sets.join("; ")) }
+    }
+
+    /// Takes the uncertainty of effects that were added where something unexplained is left: it is of a model that the data refute.
+    pub fn withhold_refuted(&mut self) {
+        let parameters = self.added.iter_mut().flat_map(|added| &mut added.parameters);
+        let withheld = parameters.filter(|_| self.verdict == Verdict::Unexplained).filter_map(|one| one.std.take());
+        if withheld.count() > 0 {
+            self.warnings.push(NO_UNCERTAINTY.into());
+            self.notes.push(NO_UNCERTAINTY.into());
+        }
     }
 
     fn in_words(&self) -> &'static str {
@@ -183,21 +196,6 @@ pub struct Estimated {
     pub unit: String,
 }
 
-/// An effect that results are corrected for.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct Correction {
-    /// Its id.
-    pub effect: String,
-    /// Where it acts; of a confounded set, one representative.
-    pub targets: Vec<String>,
-    /// What these data do not distinguish it from: "effect target".
-    pub confounded_with: Vec<String>,
-    /// Its parameters.
-    pub parameters: Vec<Estimated>,
-    /// Whether `[diagnose] known` declares it; the loop added it else.
-    pub known: bool,
-}
-
 impl Added {
     /// All that it may be: "effect target", of a confounded set "effect target or effect target".
     #[must_use]
@@ -205,42 +203,6 @@ impl Added {
         let targets = self.targets.iter().map(String::as_str);
         let first = std::iter::once(self.effect.as_str()).chain(targets).collect::<Vec<_>>().join(" ");
         std::iter::once(&first).chain(&self.confounded_with).cloned().collect::<Vec<_>>().join(" or ")
-    }
-}
-
-impl From<&Added> for Correction {
-    fn from(added: &Added) -> Self {
-        Self {
-            effect: added.effect.clone(),
-            targets: added.targets.clone(),
-            confounded_with: added.confounded_with.clone(),
-            parameters: added.parameters.clone(),
-            known: false,
-        }
-    }
-}
-
-/// "reversal-angle b: angle 0.340012 deg (standard uncertainty 0.00058)", on one line.
-impl fmt::Display for Correction {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        formatter.write_str(&self.effect)?;
-        for target in &self.targets {
-            write!(formatter, " {target}")?;
-        }
-        for other in &self.confounded_with {
-            write!(formatter, " or {other}")?;
-        }
-        for (index, one) in self.parameters.iter().enumerate() {
-            let separator = if index == 0 { ":" } else { "," };
-            write!(formatter, "{separator} {} {}", one.name, rounded(one.value, 6))?;
-            if one.unit != "1" {
-                write!(formatter, " {}", one.unit)?;
-            }
-            if let Some(std) = one.std {
-                write!(formatter, " (standard uncertainty {})", rounded(std, 2))?;
-            }
-        }
-        if self.known { formatter.write_str(" (declared as known)") } else { Ok(()) }
     }
 }
 
@@ -362,32 +324,4 @@ impl LostOrders {
 pub struct Truth {
     /// Root mean square error of form, in µm, over all sections.
     pub form_rms_error_um: Step,
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_correction_is_one_line() {
-        let angle = Estimated { name: "angle".into(), value: 0.340_012_345, std: Some(0.000_578), unit: "deg".into() };
-        let gain = Estimated { name: "gain".into(), value: -0.05, std: None, unit: "1".into() };
-        let correction = |effect: &str, target: &str, others: &[&str], parameter, known| Correction {
-            effect: effect.into(),
-            targets: vec![target.into()],
-            confounded_with: others.iter().map(|other| (*other).into()).collect(),
-            parameters: vec![parameter],
-            known,
-        };
-        assert_eq!(
-            correction("reversal-angle", "b", &[], angle, false).to_string(),
-            "reversal-angle b: angle 0.340012 deg (standard uncertainty 0.00058)"
-        );
-        assert_eq!(
-            correction("sensor-gain", "S3", &["sensor-gain S4"], gain, true).to_string(),
-            "sensor-gain S3 or sensor-gain S4: gain -0.05 (declared as known)"
-        );
-        let shown = [rounded(100.183_987_234, 6), rounded(-1.7e-5, 9), rounded(0.0, 3)].map(|value| value.to_string());
-        assert_eq!(shown, ["100.184", "-0.000017", "0"]);
-    }
 }

@@ -39,6 +39,7 @@ mod candidates;
 pub mod closed_loop;
 mod combinations;
 mod confounded;
+pub mod correction;
 pub mod diagnosis;
 pub mod evidence;
 pub mod fit;

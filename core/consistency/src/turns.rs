@@ -10,7 +10,9 @@
 mod alone;
 mod common;
 mod marks;
+mod parts;
 mod spectrum;
+mod start;
 #[cfg(test)]
 mod tests;
 
@@ -24,9 +26,6 @@ pub const ORDERS: usize = 10;
 pub const MOST_ROWS: usize = 512;
 /// Rows from which anything is said.
 const FEWEST_ROWS: usize = 8;
-
-/// The tests that a phase of all orders fails.
-const OF_PHASE: [&str; 2] = [common::PHASE, marks::AGAINST_THE_MARK];
 
 /// Low orders of the turns of one recording, one row a turn or a mean of neighbouring turns.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -54,8 +53,10 @@ pub struct Course {
     pub phase_std_rad: f64,
     /// Standard deviation of a size that all orders share, relative. 0 where none changes.
     pub size_std: f64,
-    /// The phase that all orders share, where it is a step or a run.
+    /// The phase that all orders share, where it is a step or a run of known size.
     pub phase: Option<PhaseCourse>,
+    /// The run that they show, be it more than chance or not; nothing with too few orders.
+    pub run: Option<PhaseCourse>,
     /// Orders that change by themselves, with the covariance of their course over the turns, in µm², `[channel][channel]`.
     pub orders: Vec<(usize, Vec<Complex64>)>,
 }
@@ -67,7 +68,7 @@ pub struct PhaseCourse {
     pub by_rad: f64,
     /// Its standard uncertainty, from the scatter over the orders or that over the turns, whichever is larger.
     pub std_rad: f64,
-    /// Turns before the step, and the standard uncertainty of their number; `None` for a run.
+    /// Turns from the recording's first mark to the step, and the standard uncertainty of their number; `None` for a run.
     pub step_at: Option<[f64; 2]>,
 }
 
@@ -75,13 +76,13 @@ impl PhaseCourse {
     /// The phase at each row of a table, in rad, from that of the first turn.
     fn at(&self, table: &TurnTable) -> Vec<f64> {
         let together = table.together.max(1) as f64;
-        // The row in which it steps is before it in part.
-        let behind = |row: usize, first: f64| (row as f64 + 1.0 - first).clamp(0.0, 1.0);
-        let share = |row: usize| match self.step_at {
-            Some([turns, _]) => behind(row, turns / together),
-            None => row as f64 * together,
+        let first = table.turns.first().copied().unwrap_or(0);
+        let share = |turn: &usize| match self.step_at {
+            // The row in which it steps is before it in part.
+            Some([turns, _]) => ((*turn as f64 + together - turns) / together).clamp(0.0, 1.0),
+            None => (turn - first) as f64,
         };
-        (0..table.rows()).map(|row| self.by_rad * share(row)).collect()
+        table.turns.iter().map(|turn| self.by_rad * share(turn)).collect()
     }
 }
 
@@ -113,14 +114,6 @@ impl Course {
         };
         let orders = self.orders.iter().map(|(order, matrix)| (*order, select(matrix))).collect();
         Self { orders, ..self.clone() }
-    }
-
-    /// The same where the phase that all orders share is taken out.
-    #[must_use]
-    pub fn without_phase(&self) -> Self {
-        let mut steady = Self { phase_std_rad: 0.0, phase: None, ..self.clone() };
-        steady.checks.retain(|check| !OF_PHASE.contains(&check.of.as_str()));
-        steady
     }
 
     /// Whether anything changes.
@@ -159,6 +152,21 @@ impl TurnTable {
     /// The same coefficient in every row.
     fn series(&self, order: usize, channel: usize) -> impl Iterator<Item = Complex64> + Clone + '_ {
         (0..self.rows()).map(move |row| self.at(row, order, channel))
+    }
+
+    /// Without the rows in which a phase may step.
+    fn beside(&self, phase: &PhaseCourse) -> Self {
+        let Some([step, _]) = phase.step_at else { return self.clone() };
+        let is_within =
+            |row: &usize| (self.turns[*row] as f64 - step + 0.5 * self.together as f64).abs() <= self.together as f64;
+        let rows: Vec<usize> = (0..self.rows()).filter(|row| !is_within(row)).collect();
+        let of = |width: usize| rows.iter().flat_map(move |row| row * width..(row + 1) * width);
+        Self {
+            turns: rows.iter().map(|row| self.turns[*row]).collect(),
+            levels_um: of(self.channels).map(|place| self.levels_um[place]).collect(),
+            coefficients: of(self.orders * self.channels).map(|place| self.coefficients[place]).collect(),
+            ..*self
+        }
     }
 
     /// With the phase of order 1 in each row taken out of it, and n times as much of order n.

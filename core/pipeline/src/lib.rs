@@ -36,6 +36,6 @@ pub use runout_numerics::{self as numerics, Complex64};
 pub use runout_standards as standards;
 pub use runout_table as table;
 pub use runout_turning::{
-    azimuth, checksum, clock, creep, encoder, input_file, inspection, level_step, mains, marker, measurement,
-    near_tone, neighbours, profile, provenance, reading, rig, separation, spread, station, surface,
+    azimuth, checksum, clock, counted_turns, creep, encoder, input_file, inspection, level_step, mains, marker,
+    measurement, near_tone, neighbours, profile, provenance, reading, rig, separation, spread, station, surface,
 };

@@ -10,7 +10,7 @@ use std::{collections::BTreeMap, path::PathBuf};
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize};
 
-use runout_closed_loop::diagnosis::{self, Correction};
+use runout_closed_loop::{correction::Correction, diagnosis};
 use runout_consistency::{Check, Test, refuted_by};
 use runout_turning::{provenance::Provenance, reading::ReadingValues, separation::Assessment, surface::Meeting};
 

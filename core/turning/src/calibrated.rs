@@ -82,7 +82,7 @@ mod tests {
             SensorConfig { id: "S1".into(), unit, um_per_volt, gain, ..SensorConfig::default() },
             SensorConfig { id: "S2".into(), angle_deg: 90.0, ..SensorConfig::default() },
         ];
-        let setups = vec![SetupConfig { id: "a".into(), part_deg: 0.0, sensors_deg: 0.0 }];
+        let setups = vec![SetupConfig { id: "a".into(), ..SetupConfig::default() }];
         let rotation = Rotation::Ccw;
         RigConfig { part_radius_mm: 30.0, rotation, sensors, setups, interruptions: Vec::new() }.check().unwrap()
     }

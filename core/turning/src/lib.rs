@@ -24,6 +24,7 @@ pub mod azimuth;
 pub mod calibrated;
 pub mod checksum;
 pub mod clock;
+pub mod counted_turns;
 pub mod creep;
 pub mod encoder;
 pub mod groove;

@@ -259,6 +259,8 @@ pub enum DefectKind {
     WrappedRound,
     /// Exactly equal for a good part of a turn, anywhere.
     Stuck,
+    /// Among samples where some were lost.
+    Lost,
 }
 
 impl std::fmt::Display for DefectKind {
@@ -269,6 +271,7 @@ impl std::fmt::Display for DefectKind {
             Self::Clipped => "clipped",
             Self::WrappedRound => "wrapped round (a step of nearly the converter's range)",
             Self::Stuck => "stuck at one value",
+            Self::Lost => "where samples were lost",
         })
     }
 }

@@ -8,7 +8,7 @@ use crate::{
     neighbours::Neighbours,
     spread::Spread,
 };
-use runout_consistency::turns::Course;
+use runout_consistency::turns::{Course, PhaseCourse};
 use runout_numerics::Complex64;
 use std::f64::consts::FRAC_1_SQRT_2;
 
@@ -43,6 +43,8 @@ pub struct Profile {
     pub levels: TurnLevels,
     /// What the low orders of its turns say of their course.
     pub course: Course,
+    /// What its marks were put right by, where they do not count the part's turns.
+    pub recounted: Option<Recounted>,
     /// The same turns in parts, where asked for.
     pub split: Option<Split>,
     /// How far the turns lie apart, where asked for and there are two.
@@ -64,6 +66,15 @@ pub struct Profile {
     pub bridged_beyond_rad: f64,
     /// What the user should know of this capture.
     pub warnings: Vec<String>,
+}
+
+/// Turns that are counted otherwise than by the recorded marks.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Recounted {
+    /// How the part turns against the marks: each against what the one before leaves.
+    pub by: Vec<PhaseCourse>,
+    /// The average by the marks as they are recorded.
+    pub as_marked: Box<Profile>,
 }
 
 /// Mean levels of turns, as far as they are in an average.

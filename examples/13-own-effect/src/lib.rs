@@ -90,7 +90,7 @@ mod tests {
             sign: 1,
             ..SensorConfig::default()
         };
-        let setup = |(id, part_deg): (&str, f64)| SetupConfig { id: id.into(), part_deg, sensors_deg: 0.0 };
+        let setup = |(id, part_deg): (&str, f64)| SetupConfig { id: id.into(), part_deg, ..SetupConfig::default() };
         let mut config = SpindleConfig::new(RigConfig {
             interruptions: Vec::new(),
             part_radius_mm: 30.0,

@@ -80,7 +80,7 @@ fn record(path: &Path, mut suggestion: Suggestion) {
     suggestion.channels.truncate(SENSORS);
     let sensor =
         |[id, _]: &[String; 2]| SensorConfig { id: id.clone(), section: id.clone(), ..SensorConfig::default() };
-    let setup = |id: &str| SetupConfig { id: id.to_owned(), part_deg: 0.0, sensors_deg: 0.0 };
+    let setup = |id: &str| SetupConfig { id: id.to_owned(), ..SetupConfig::default() };
     let setups: Vec<SetupConfig> = suggestion.setups.iter().map(|[id, _]| setup(id)).collect();
     let rig = RigConfig {
         interruptions: Vec::new(),

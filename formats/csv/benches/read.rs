@@ -28,7 +28,7 @@ fn rig() -> Rig {
         part_radius_mm: 30.0,
         rotation: Rotation::Ccw,
         sensors: vec![sensor("S1", 0.0), sensor("S2", 90.0), sensor("S3", 180.0), sensor("S4", 228.75)],
-        setups: vec![SetupConfig { id: "one".into(), part_deg: 0.0, sensors_deg: 0.0 }],
+        setups: vec![SetupConfig { id: "one".into(), ..SetupConfig::default() }],
     }
     .check()
     .unwrap()

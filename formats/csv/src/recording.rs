@@ -221,7 +221,7 @@ mod tests {
             part_radius_mm: 30.0,
             rotation: Rotation::Ccw,
             sensors: vec![sensor("S1", 1), sensor("S2", -1)],
-            setups: vec![SetupConfig { id: "one".into(), part_deg: 0.0, sensors_deg: 0.0 }],
+            setups: vec![SetupConfig { id: "one".into(), ..SetupConfig::default() }],
         };
         config.check().unwrap()
     }

@@ -25,7 +25,7 @@ fn rig(setups: &[&str]) -> Rig {
         sign,
         ..SensorConfig::default()
     };
-    let setup = |id: &&str| SetupConfig { id: (*id).into(), part_deg: 0.0, sensors_deg: 0.0 };
+    let setup = |id: &&str| SetupConfig { id: (*id).into(), ..SetupConfig::default() };
     let config = RigConfig {
         interruptions: Vec::new(),
         part_radius_mm: 30.0,

@@ -24,7 +24,7 @@ pub(crate) fn rig() -> Rig {
         sign,
         ..SensorConfig::default()
     };
-    let setup = |id: &str| SetupConfig { id: id.into(), part_deg: 0.0, sensors_deg: 0.0 };
+    let setup = |id: &str| SetupConfig { id: id.into(), ..SetupConfig::default() };
     let config = RigConfig {
         interruptions: Vec::new(),
         part_radius_mm: 30.0,

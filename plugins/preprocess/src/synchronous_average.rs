@@ -349,6 +349,7 @@ impl Averager for SynchronousAverage {
             near_tones: outcome.near_tones,
             levels: outcome.levels,
             course: outcome.course,
+            recounted: None,
             split: outcome.split,
             spread: outcome.spread,
             turns: count,

@@ -4,8 +4,6 @@ use std::{fmt, sync::Arc};
 
 use runout_core::{Complex64, rig};
 
-use crate::turning::Turning;
-
 /// Everything that effects change, at its declared value until one does.
 #[derive(Debug, Clone)]
 #[allow(clippy::struct_excessive_bools, reason = "each is an effect that is there or not")]
@@ -163,8 +161,6 @@ pub struct SetupAlteration {
     pub backwards: bool,
     /// Motion over that of the first setup, less 1.
     pub motion: f64,
-    /// How all channels turn against the mark from turn to turn.
-    pub turning: Turning,
     /// Uneven speed within the turn.
     pub ripples: Vec<Harmonic>,
 }

@@ -10,7 +10,6 @@ pub mod separators;
 pub mod simulate;
 mod sizes;
 mod solve;
-mod turning;
 mod wiring;
 
 use runout_core::pipeline::{Plugin, Registry};

@@ -64,7 +64,7 @@ fn config(rotation: Rotation, sensors: Vec<SensorConfig>, part_deg: &[f64]) -> R
     let setup = |(index, part_deg): (usize, &f64)| SetupConfig {
         id: format!("k{index}"),
         part_deg: *part_deg,
-        sensors_deg: 0.0,
+        ..SetupConfig::default()
     };
     RigConfig {
         part_radius_mm: 12.7,

@@ -28,7 +28,7 @@ fn unusual(name: &str, seed: u64) -> SpindleConfig {
             let setup = |index: u32| SetupConfig {
                 id: format!("k{index}"),
                 part_deg: f64::from(45 * index + 3 * index * index % 13),
-                sensors_deg: 0.0,
+                ..SetupConfig::default()
             };
             config.rig.setups = (0..8).map(setup).collect();
         }

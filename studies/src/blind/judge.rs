@@ -8,6 +8,7 @@ use runout_core::{
         diagnosis::{Added, Diagnosis, Verdict},
     },
     numerics::fourier::Fourier,
+    pipeline::put_right,
     separation::{Quantity, Separation},
     stage::StationDiagnosis,
 };
@@ -15,6 +16,7 @@ use runout_spindle::{
     diagnose::diagnose,
     effects, layout,
     selection::Selection,
+    separators::{HarmonicLeastSquares, Weighting},
     simulate::{Effect, SpindleConfig, simulator},
 };
 
@@ -80,7 +82,12 @@ fn run(config: &SpindleConfig, campaign: &Campaign, effects: Option<Vec<String>>
     let (station, truth) = campaign::station_holding_out(&simulator, &rig, 0, size, Some(HOLD_OUT))?;
     let layout = layout::Layout::new(&rig, campaign.rig == Layout::Paper);
     let settings = Settings { effects, ..Settings::default() };
-    let said = diagnose(Selection::whole(&rig), layout, campaign.second_order, effects::all(), &[station], &settings)?;
+    let mut stations = [station];
+    let separator = HarmonicLeastSquares::new(&rig, campaign.second_order, Weighting::TurnCovariance);
+    let put_right = put_right::put_right(&mut stations, &settings, &rig, &separator)?;
+    let mut said =
+        diagnose(Selection::whole(&rig), layout, campaign.second_order, effects::all(), &stations, &settings)?;
+    put_right.say(&mut said);
     Ok(Run { said, truth })
 }
 

@@ -1,107 +1,108 @@
 //! What all orders share: a phase over n, or a relative size, that runs or steps.
 
-use runout_numerics::{
-    Complex64,
-    fourier::Fourier,
-    statistics::{f_tail, student_95},
-};
+use runout_numerics::statistics::{f_tail, student_95};
 
-use super::{Course, PhaseCourse, TurnTable, mean};
+use super::{
+    Course, ORDERS, PhaseCourse, TurnTable,
+    parts::{ALIKE_STEPS, LOOKS, Parts, Shared, over_turns},
+    start,
+};
 use crate::check::{Check, Test};
 
-/// An order counts where its mean is this many standard errors.
-const STRONG: f64 = 8.0;
-/// Orders that have to agree.
-const FEWEST_ORDERS: usize = 3;
-/// Rows at each end that a step is not looked for in.
-const END_ROWS: usize = 3;
-/// Phase and size, run and step, and five times that: lines have a heavier tail than Student's t.
-const LOOKS: f64 = 20.0;
-/// Steps at neighbouring turns are one step.
-const ALIKE_STEPS: f64 = 4.0;
 /// Least standard uncertainty of where a phase steps, in rows.
 const WITHIN_A_TURN: f64 = 0.5;
-/// Share of a weight that is no leverage, at least.
-const LEAST_LEFT: f64 = 0.3;
-
+/// Rows on either side of those in which it may step at least: of fewer, place and size are one guess.
+const FEWEST_BESIDE: usize = 3;
 /// Rounds in which a phase is taken out and what is left of it is looked for: each leaves the cube of what the one before left.
 const ROUNDS: usize = 6;
 /// The test of the phase.
-pub(super) const PHASE: &str = "phase of all orders";
-
-/// A course that orders share.
-#[derive(Debug, Clone, Copy)]
-struct Shared {
-    /// Change a row, or at the step.
-    by: f64,
-    /// First row behind the step; `None` for a run.
-    step: Option<usize>,
-    /// Student's t over the orders.
-    t: f64,
-    p: f64,
-}
+const PHASE: &str = "phase of all orders";
 
 /// Looks at phase and size.
 pub(super) fn look(table: &TurnTable, course: &mut Course) {
-    let rows = table.rows() as f64;
-    let found = Parts::of(table).map(|parts| parts.and_then(|part| part.shared(table.rows())));
-    for (is_phase, shared) in [true, false].into_iter().zip(found) {
-        let Some(shared) = shared else { continue };
-        let name = if is_phase { PHASE } else { "size of all orders" };
-        let p = (LOOKS * shared.p).min(1.0);
-        let check = Check::new(Test::Turns, name, shared.t, &[], p).finding(|| words(table, is_phase, shared));
-        // What turns against the mark is said already.
-        let said = is_phase && course.phase_std_rad > 0.0;
-        if said {
-            continue;
-        }
+    let [phase, size] = Parts::of(table).map(|parts| parts.and_then(|parts| parts.shared(table.rows())));
+    if let Some(size) = size {
+        let check = Check::new(Test::Turns, "size of all orders", size.t, &[], (LOOKS * size.p).min(1.0));
+        let check = check.finding(|| words(table, false, size));
         if check.refutes() {
-            let share = shared.step.map_or_else(
-                || ((rows * rows - 1.0) / 12.0).sqrt(),
-                |row| (row as f64 * (rows - row as f64)).sqrt() / rows,
-            );
-            let std = if is_phase { &mut course.phase_std_rad } else { &mut course.size_std };
-            *std = shared.by.abs() * share;
-            if is_phase {
-                let together = table.together.max(1) as f64;
-                let step_at = shared.step.map(|row| [row as f64 * together, f64::NAN]);
-                let by_rad = if step_at.is_some() { shared.by } else { shared.by / together };
-                course.phase = Some(PhaseCourse { by_rad, std_rad: f64::NAN, step_at });
-            }
+            course.size_std = size.by.abs() * size.share(table.rows());
         }
         course.checks.push(check);
     }
-    course.phase = course.phase.and_then(|phase| settled(phase, table));
+    // Marks once in several turns, or several times a turn, are said already.
+    if course.phase.is_none_or(|phase| phase.std_rad.is_nan()) {
+        look_at_phase(table, phase, course);
+    }
 }
 
-/// Rows on either side of a step at least: of fewer, place and size are one guess.
-const FEWEST_BESIDE: f64 = 3.5;
-
-/// The phase that leaves nothing of its shape when it is taken out of all orders; `None` where too few orders show it.
-fn settled(mut phase: PhaseCourse, table: &TurnTable) -> Option<PhaseCourse> {
+/// Takes the phase that the linear fit, the products of turns or order 1 alone begin with, and that leaves nothing of its shape.
+fn look_at_phase(table: &TurnTable, linear: Option<Shared>, course: &mut Course) {
     let (rows, together) = (table.rows() as f64, table.together.max(1) as f64);
-    let beside = phase.step_at.map(|[turns, _]| (turns / together).min(rows - turns / together));
-    if beside.is_some_and(|rows| rows < FEWEST_BESIDE) {
+    let run = |by_row: f64| PhaseCourse { by_rad: by_row / together, std_rad: f64::NAN, step_at: None };
+    let step = |by_rad: f64, first: usize| PhaseCourse {
+        by_rad,
+        std_rad: f64::NAN,
+        step_at: Some([table.turns[first] as f64, f64::NAN]),
+    };
+    let (by_rad, first) = start::step(table);
+    let all = rows * ORDERS as f64;
+    let tried = [
+        Some((run(0.0), 1.0)),
+        Some((run(start::run(table)), all)),
+        Some((step(by_rad, first), all)),
+        linear.and_then(|linear| Some((step(linear.by, linear.step?), rows / ALIKE_STEPS))),
+        course.phase.take().map(|phase| (phase, 1.0)),
+    ];
+    let settled = tried.map(|tried| tried.and_then(|(phase, count)| settled(phase, count, table)));
+    course.run = settled[0].map(|(phase, _)| phase);
+    let settled = settled.into_iter().flatten().min_by(|a, b| a.1.p.total_cmp(&b.1.p));
+    // What turns against the mark by order 1 is said already.
+    let is_said = course.phase_std_rad > 0.0;
+    let shared = settled.map(|(_, shared)| shared).filter(Shared::refutes).or(linear);
+    if let Some(shared) = shared.filter(|_| !is_said) {
+        let check = Check::new(Test::Turns, PHASE, shared.t, &[], (LOOKS * shared.p).min(1.0));
+        let check = check.finding(|| words(table, true, shared));
+        if check.refutes() {
+            course.phase_std_rad = shared.by.abs() * shared.share(table.rows());
+        }
+        course.checks.push(check);
+    }
+    course.phase = settled.filter(|(_, shared)| shared.refutes()).map(|(phase, _)| phase);
+}
+
+/// The phase that leaves nothing of its shape when it is taken out of all orders, tried among `count`; `None` where too few orders show it.
+fn settled(mut phase: PhaseCourse, count: f64, table: &TurnTable) -> Option<(PhaseCourse, Shared)> {
+    let table = &table.beside(&phase);
+    let (rows, together) = (table.rows() as f64, table.together.max(1) as f64);
+    let row = |turns: f64| table.turns.partition_point(|turn| (*turn as f64) < turns);
+    let step = phase.step_at.map(|[turns, _]| row(turns));
+    if step.is_some_and(|row| row.min(table.rows() - row) < FEWEST_BESIDE) {
         return None;
     }
+    let mut found = None;
     for _ in 0..ROUNDS {
         let shape = PhaseCourse { by_rad: 1.0, ..phase }.at(table);
         let middle = shape.iter().sum::<f64>() / rows;
         let shape: Vec<f64> = shape.into_iter().map(|value| value - middle).collect();
         let [parts, _] = Parts::of(&table.turned_back(&phase.at(table)));
         let parts = parts?;
-        let (left_rad, std_rad, freedom) = parts.over_orders(&shape)?;
-        let of_orders_rad = std_rad * student_95(freedom) / student_95(f64::INFINITY);
-        let (of_turns_rad, _) = over_turns(&parts.common(), &shape);
-        (phase.by_rad, phase.std_rad) = (phase.by_rad + left_rad, of_orders_rad.max(of_turns_rad));
+        let (left_rad, of_orders_rad, freedom) = parts.over_orders(&shape)?;
+        let common = parts.common();
+        phase.by_rad += left_rad;
+        let whole: Vec<f64> = common.iter().zip(&shape).map(|(left, shape)| left + phase.by_rad * shape).collect();
+        let (of_turns_rad, p_of_turns) = over_turns(&whole, &shape);
+        phase.std_rad = (of_orders_rad * student_95(freedom) / student_95(f64::INFINITY)).max(of_turns_rad);
         // Where it steps, rows show as well as they scatter beside it, and to a part of a turn at best.
         if let Some([_, std]) = &mut phase.step_at {
-            let common = parts.common();
             let scatter = common.iter().map(|value| value * value).sum::<f64>() / rows;
             *std = together * (scatter / (phase.by_rad * phase.by_rad)).max(WITHIN_A_TURN);
         }
+        let t = phase.by_rad / of_orders_rad;
+        let p = f_tail(t * t, 1.0, freedom).max(count.max(1.0) * p_of_turns);
+        let by = if step.is_some() { phase.by_rad } else { phase.by_rad * together };
+        found = Some((phase, Shared { by, step, t, p }));
     }
-    Some(phase)
+    found
 }
 
 fn words(table: &TurnTable, is_phase: bool, shared: Shared) -> String {
@@ -125,133 +126,4 @@ pub(super) fn turning(by_rad: f64, who: &str) -> String {
         "{who} against the mark by {:.3}° a turn: the mark is on another shaft, or slips; ratio {ratio:.digits$}",
         by_rad.to_degrees()
     )
-}
-
-/// A part of the coefficients beside their mean, of the strong ones: phase over n, or relative size.
-struct Parts {
-    /// `[cell][row]`.
-    values: Vec<Vec<f64>>,
-    /// Order and weight of each cell.
-    cells: Vec<(usize, f64)>,
-}
-
-impl Parts {
-    /// Of phase and of size; `None` where fewer than three orders are strong.
-    fn of(table: &TurnTable) -> [Option<Self>; 2] {
-        let rows = table.rows() as f64;
-        let mut both = [Self { values: Vec::new(), cells: Vec::new() }, Self { values: Vec::new(), cells: Vec::new() }];
-        for order in 1..=table.orders {
-            for channel in 0..table.channels {
-                let mean = mean(table.series(order, channel));
-                let squares: f64 = table.series(order, channel).map(|value| (value - mean).norm_sqr()).sum();
-                let error = squares / (rows - 1.0) / rows;
-                let strength = mean.norm_sqr() / error.max(1e-18 * mean.norm_sqr()).max(f64::MIN_POSITIVE);
-                if strength.is_nan() || strength <= STRONG * STRONG {
-                    continue;
-                }
-                let relative = table.series(order, channel).map(|value| value * mean.conj() / mean.norm_sqr());
-                let number = order as f64;
-                both[0].values.push(relative.clone().map(|value: Complex64| value.im / number).collect());
-                both[0].cells.push((order, strength * number * number));
-                both[1].values.push(relative.map(|value| value.re - 1.0).collect());
-                both[1].cells.push((order, strength));
-            }
-        }
-        both.map(|parts| {
-            let mut orders: Vec<usize> = parts.cells.iter().map(|(order, _)| *order).collect();
-            orders.dedup();
-            (orders.len() >= FEWEST_ORDERS).then_some(parts)
-        })
-    }
-
-    /// What the cells have in common, by their weights, about its mean, `[row]`.
-    fn common(&self) -> Vec<f64> {
-        let whole: f64 = self.cells.iter().map(|(_, weight)| weight).sum();
-        let mut series = vec![0.0; self.values.first().map_or(0, Vec::len)];
-        for (values, (_, weight)) in self.values.iter().zip(&self.cells) {
-            series.iter_mut().zip(values).for_each(|(sum, value)| *sum += weight / whole * value);
-        }
-        let level = series.iter().sum::<f64>() / series.len().max(1) as f64;
-        series.iter_mut().for_each(|value| *value -= level);
-        series
-    }
-
-    /// The run, or the step at the best turn, whichever is less likely chance.
-    fn shared(&self, rows: usize) -> Option<Shared> {
-        let middle = 0.5 * (rows as f64 - 1.0);
-        let run: Vec<f64> = (0..rows).map(|row| row as f64 - middle).collect();
-        let series = self.common();
-        let step = |first: usize| -> Vec<f64> {
-            let share = first as f64 / rows as f64;
-            (0..rows).map(|row| if row < first { share - 1.0 } else { share }).collect()
-        };
-        let mut before: f64 = series[..END_ROWS].iter().sum();
-        let mut best = (0.0, END_ROWS);
-        for first in END_ROWS..=rows - END_ROWS {
-            let size = before.powi(2) / (first * (rows - first)) as f64;
-            if size > best.0 {
-                best = (size, first);
-            }
-            before += series[first.min(rows - 1)];
-        }
-        let steps = (rows as f64 / ALIKE_STEPS).max(1.0);
-        let candidates = [(run, None, 1.0), (step(best.1), Some(best.1), steps)];
-        let tested = candidates.into_iter().filter_map(|(shape, step, count)| {
-            let (by, std, freedom) = self.over_orders(&shape)?;
-            let t = by / std;
-            let over_orders = f_tail(t * t, 1.0, freedom);
-            Some(Shared { by, step, t, p: over_orders.max(over_turns(&series, &shape).1 * count) })
-        });
-        tested.min_by(|a, b| a.p.total_cmp(&b.p))
-    }
-
-    /// Size of a shape in the mean over orders, its standard uncertainty by their scatter, and the degrees of freedom of that. No order
-    /// decides alone: three at least share the weight.
-    fn over_orders(&self, shape: &[f64]) -> Option<(f64, f64, f64)> {
-        let square: f64 = shape.iter().map(|value| value * value).sum();
-        let mut orders: Vec<(usize, f64, f64)> = Vec::new();
-        for (values, (order, weight)) in self.values.iter().zip(&self.cells) {
-            let size = values.iter().zip(shape).map(|(value, shape)| value * shape).sum::<f64>() / square;
-            match orders.last_mut().filter(|(number, ..)| number == order) {
-                Some((_, sum, all)) => (*sum, *all) = (*sum + weight * size, *all + weight),
-                None => orders.push((*order, weight * size, *weight)),
-            }
-        }
-        let mut largest: Vec<f64> = orders.iter().map(|(.., weight)| *weight).collect();
-        largest.sort_by(|a, b| b.total_cmp(a));
-        let most = 2.0 * largest.get(FEWEST_ORDERS - 1)?;
-        let shares: Vec<(f64, f64)> = orders.iter().map(|(_, sum, weight)| (sum / weight, weight.min(most))).collect();
-        let whole: f64 = shares.iter().map(|(_, weight)| weight).sum();
-        let size = shares.iter().map(|(size, weight)| size * weight).sum::<f64>() / whole;
-        let (mut variance, mut squares) = (0.0, 0.0);
-        for (own, weight) in &shares {
-            let leverage = weight / whole;
-            variance += leverage * leverage * (own - size).powi(2) / (1.0 - leverage).max(LEAST_LEFT);
-            squares += leverage * leverage;
-        }
-        let freedom = (1.0 / squares - 1.0).max(1.0);
-        let std = variance.sqrt().max(f64::MIN_POSITIVE);
-        Some((size, std, freedom))
-    }
-}
-
-/// Standard uncertainty of a shape's size in the common course, and the chance that it has as much of it, from the scatter of its turns: at
-/// least that of the slow part of their spectrum.
-fn over_turns(series: &[f64], shape: &[f64]) -> (f64, f64) {
-    let rows = series.len();
-    let norm = shape.iter().map(|value| value * value).sum::<f64>().sqrt();
-    let size = series.iter().zip(shape).map(|(value, shape)| value * shape / norm).sum::<f64>();
-    let left: Vec<f64> = series.iter().zip(shape).map(|(value, shape)| value - size * shape / norm).collect();
-    let mut mirrored: Vec<f64> = left.iter().chain(left.iter().rev()).copied().collect();
-    let mut harmonics = vec![Complex64::ZERO; rows];
-    Fourier::new(2 * rows).analyse_in_place(&mut mirrored, &mut harmonics);
-    let slow = (rows / 8).max(4);
-    let power = |component: usize| {
-        let turned = Complex64::cis(-std::f64::consts::PI * component as f64 / (2 * rows) as f64);
-        0.5 * rows as f64 * (turned * harmonics[component]).re.powi(2)
-    };
-    let all: f64 = left.iter().map(|value| value * value).sum::<f64>() / (rows as f64 - 2.0);
-    let of_slow = (1..=slow.min(rows - 1)).map(power).sum::<f64>() / slow as f64;
-    let (variance, freedom) = if of_slow > all { (of_slow, slow as f64) } else { (all, rows as f64 - 2.0) };
-    (variance.sqrt() / norm, f_tail(size * size / variance.max(f64::MIN_POSITIVE), 1.0, freedom))
 }

@@ -26,17 +26,12 @@ const AT_ORDERS: usize = 3;
 /// Power of what alternates beside all that is synchronous.
 const SHARE: f64 = 0.01;
 
-/// The test of order 1.
-pub(super) const AGAINST_THE_MARK: &str = "order 1 against the mark";
-
 pub(super) fn look(table: &TurnTable, spectrum: &Spectrum, course: &mut Course) {
     let found = [several_a_turn(table, spectrum), once_in_several(table), turns_against_the_mark(table)];
     for found in found {
         course.checks.push(found.check);
-        if found.phase_std_rad > 0.0 {
-            course.phase_std_rad = found.phase_std_rad;
-            course.phase = found.phase;
-        }
+        course.phase_std_rad = found.phase_std_rad.max(course.phase_std_rad);
+        course.phase = found.phase.or(course.phase);
         if found.is_open {
             course.orders = (1..=table.orders).map(|order| (order, scatter(table, order))).collect();
         }
@@ -60,6 +55,13 @@ impl Found {
         let is_open = words.is_some();
         let check = Check::new(Test::Turns, of, statistic, &[], p).finding(|| words.unwrap_or_default());
         Self { check, phase_std_rad: 0.0, phase: None, is_open }
+    }
+
+    /// With the turning that so many turns from one mark to the next are, where something was found.
+    fn of_turns_per_mark(mut self, turns: f64) -> Self {
+        let phase = PhaseCourse { by_rad: TAU * (1.0 - turns), std_rad: 0.0, step_at: None };
+        self.phase = self.is_open.then_some(phase);
+        self
     }
 }
 
@@ -97,7 +99,7 @@ fn turns_against_the_mark(table: &TurnTable) -> Found {
     let is_turning = is_turning && !(2..=table.orders).any(|order| 1.0 - steady(table, order) < 0.5 * (1.0 - before));
     let by_turn = by_rad / table.together.max(1) as f64;
     let words = is_turning.then(|| turning(by_turn, "order 1 turns"));
-    let mut found = Found::new(AGAINST_THE_MARK, before, words);
+    let mut found = Found::new("order 1 against the mark", before, words);
     if is_turning {
         found.phase_std_rad = by_rad.abs() * ((rows * rows - 1) as f64 / 12.0).sqrt();
         // How well it is known, all orders show.
@@ -146,7 +148,8 @@ fn once_in_several(table: &TurnTable) -> Found {
         let others = if turns == 2 { "odd orders are empty" } else { "orders that are no multiples of 3 are empty" };
         format!("{others} and order {turns} is the largest: the mark comes once in {turns} turns of the part")
     });
-    Found::new("empty orders", turns.unwrap_or(1) as f64, words)
+    let turns = turns.unwrap_or(1) as f64;
+    Found::new("empty orders", turns, words).of_turns_per_mark(turns)
 }
 
 /// Every second turn is another one, at several orders at once.
@@ -166,7 +169,7 @@ fn several_a_turn(table: &TurnTable, spectrum: &Spectrum) -> Found {
         let size = (odd / table.channels as f64).sqrt();
         format!("even and odd turns differ by {:.3} µm: two marks a turn, or motion at half of the speed", 2.0 * size)
     });
-    Found::new("even and odd turns", alternating as f64, words)
+    Found::new("even and odd turns", alternating as f64, words).of_turns_per_mark(0.5)
 }
 
 /// Covariance of single turns, `[channel][channel]`.

@@ -9,9 +9,10 @@ use corrected_rig::Change;
 
 use super::{
     config::{Pipeline, Route, exports::spare_inputs},
-    exchanged_stations, hidden_readings,
+    hidden_readings,
     observer::Observer,
     point_run::{self, PointResult},
+    put_right,
     record_reader::{RecordReader, separate},
     result_writer::{Finished, ResultWriter},
     run::projections,
@@ -26,7 +27,8 @@ use crate::{
 };
 use runout_closed_loop::{
     Effect, Setting, closed_loop,
-    diagnosis::{Correction, Diagnosis, Estimated, Step, Truth},
+    correction::Correction,
+    diagnosis::{Diagnosis, Estimated, Step, Truth},
 };
 use runout_error::{Error, ErrorKind, Result};
 use runout_evaluate::{EvaluatedStation, Group};
@@ -78,6 +80,7 @@ pub fn diagnosed(pipeline: &Pipeline, threads: Option<NonZeroUsize>, observer: &
                 hold_out,
                 projections: projections(pipeline, &**separator, rig),
                 alone: false,
+                puts_marks_right: put_right::marks::are_looked_for(&pipeline.diagnose.settings),
             };
             diagnose_turns(pipeline, &line, threads, (&**separator, &**model), observer)
         }
@@ -115,11 +118,12 @@ fn diagnose_turns(
         },
     )?;
     let settings = &pipeline.diagnose.settings;
-    let mut exchanged = exchanged_stations::put_right(&mut stations, settings, line.rig, separator)?;
+    let mut put_right = put_right::put_right(&mut stations, settings, line.rig, separator)?;
     let mut found = hidden_readings::diagnose(&mut stations, settings, line.rig, (separator, model))?;
-    let as_named: Vec<_> = (0..stations.len()).map(|station| exchanged.declared(station)).collect();
-    exchanged.say(&mut found);
-    let (mut diagnosis, turned_back) = (found.diagnosis, found.turned_back);
+    let as_named: Vec<_> = (0..stations.len()).map(|station| put_right.declared(station)).collect();
+    put_right.say(&mut found);
+    let mut diagnosis = found.diagnosis;
+    diagnosis.withhold_refuted();
     diagnosis.moved.clear();
     let mut writer = ResultWriter::begin(pipeline, &pipeline.diagnosed, recording.stations())?;
     let known = known(model.effects(), &settings.known, |effect| model.changes(effect, &settings.known));
@@ -148,12 +152,7 @@ fn diagnose_turns(
             EvaluatedStation::of(result, evaluate, radius_mm, Some(line.rig), recording.stations().len())
         };
         let declared = complete(before, Vec::new(), &looked_at);
-        // What the model takes out of the turns refutes none of its values.
-        let mut profiles = station.profiles;
-        for profile in profiles.iter_mut().filter(|profile| turned_back.contains(&profile.setup)) {
-            profile.course = profile.course.without_phase();
-        }
-        let found = complete(after, profiles, &pipeline.evaluate);
+        let found = complete(after, station.profiles.clone(), &pipeline.evaluate);
         diagnosis.moved.extend(moved::moved(&declared, &found, &looked_at, radius_mm, several));
         for (errors, EvaluatedStation { result, .. }) in errors.iter_mut().zip([&declared, &found]) {
             let forms = (0..result.separation.sections.len()).map(Quantity::Form);
@@ -224,7 +223,8 @@ fn diagnose_points(
     let found = model.diagnose(points, &closed_loop::Settings { max_added: MOST_ADDED, ..settings })?;
     let effects = corrections(&changes(known, &found.diagnosis));
     let of_run = point_run::findings(pipeline, points, separator)?;
-    let diagnosis = Diagnosis { lost_orders: found.after.lost_orders.clone(), ..found.diagnosis };
+    let mut diagnosis = Diagnosis { lost_orders: found.after.lost_orders.clone(), ..found.diagnosis };
+    diagnosis.withhold_refuted();
     let diagnosis = Some((diagnosis, of_run));
     let result = PointResult { outcome: found.after, remarks: None, effects, diagnosis };
     commit(result.write(pipeline, &pipeline.diagnosed, points, observer)?, pipeline.diagnosis_path())

@@ -10,7 +10,7 @@ use crate::{
     points::Points,
     stage::{Evaluable, EvaluableKind, Exporter, Form, Outcome, PlaneMap, PointSeparator},
 };
-use runout_closed_loop::diagnosis::{Correction, Diagnosis};
+use runout_closed_loop::{correction::Correction, diagnosis::Diagnosis};
 use runout_consistency::refuted_by;
 use runout_error::{Error, Result};
 use runout_evaluate::{Evaluated, EvaluatedStation};

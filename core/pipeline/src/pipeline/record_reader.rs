@@ -12,13 +12,16 @@ use super::{
     hidden_readings,
     observer::Observer,
     ordered_collector::OrderedCollector,
+    put_right,
     read_ahead::{Captures, read_ahead, read_along, work_behind},
 };
 use crate::stage::{AverageRequest, Averager, Conditioner, Station, StationSeparator};
+use runout_consistency::turns::PhaseCourse;
 use runout_error::{Error, ErrorKind, Result};
 use runout_numerics::threads;
 use runout_turning::{
     calibrated::calibrated,
+    counted_turns,
     input_file::InputFile,
     inspection::{Inspection, Spike},
     measurement::{Capture, Recording, SampleStream, StationKey},
@@ -40,6 +43,8 @@ pub(crate) struct RecordReader<'a> {
     pub hold_out: Option<f64>,
     /// How motion follows from the readings of each setup, where the spread over the turns is wanted.
     pub projections: Vec<Option<Projection>>,
+    /// Whether turns are counted by the marks that they show, where those recorded do not count them.
+    pub puts_marks_right: bool,
     /// Whether one thread does all: the others have recordings of their own.
     pub alone: bool,
 }
@@ -82,13 +87,13 @@ impl RecordReader<'_> {
             let captures =
                 claimed.flat_map(|station| (0..setups).map(move |setup| (station, setup))).map(|(station, setup)| {
                     let spikes = &spikes[station * setups + setup];
-                    (station, self.recorded(readers, station, setup, spikes))
+                    (station, self.recorded(readers, station, setup, &[], spikes))
                 });
             let average = |captures: &mut dyn Captures<usize>,
                            hand_on: &mut dyn FnMut((usize, Result<Station>)) -> bool| {
                 while let Some(index) = captures.coming() {
                     let spikes = &spikes[index * setups..(index + 1) * setups];
-                    if !hand_on((index, self.station(&stations[index], captures, spikes))) {
+                    if !hand_on((index, self.station((index, &stations[index]), captures, spikes))) {
                         break;
                     }
                 }
@@ -134,15 +139,18 @@ impl RecordReader<'_> {
         inputs
     }
 
-    /// A capture as it is read and conditioned; every sample is looked at before anything else touches it.
+    /// A capture as it is read, its turns counted and conditioned; every sample is looked at before anything else touches it.
     fn recorded<'b>(
         &'b self,
         threads: NonZeroUsize,
         station: usize,
         setup: usize,
+        counted_by: &[PhaseCourse],
         spikes: &'b Mutex<Vec<Spike>>,
     ) -> Result<Box<dyn SampleStream + 'b>> {
         let opened = calibrated(self.recording.open_with(threads, station, setup)?, self.rig);
+        let opened = counted_turns::declared(opened, self.rig.setups[setup].turns_per_mark);
+        let opened = counted_by.iter().fold(opened, counted_turns::counted);
         let report = |found| *spikes.lock().unwrap_or_else(PoisonError::into_inner) = found;
         let inspected: Box<dyn SampleStream + '_> = Box::new(Inspection::reporting(opened, report));
         self.conditioners.iter().try_fold(inspected, |stream, conditioner| conditioner.attach(stream))
@@ -151,7 +159,7 @@ impl RecordReader<'_> {
     /// Takes all of a station's captures, also behind one that failed.
     fn station(
         &self,
-        key: &StationKey,
+        (index, key): (usize, &StationKey),
         captures: &mut dyn Captures<usize>,
         spikes: &[Mutex<Vec<Spike>>],
     ) -> Result<Station> {
@@ -166,6 +174,13 @@ impl RecordReader<'_> {
                 let mut profile = self.averager.average_requested(stream, wanted)?;
                 let spikes = std::mem::take(&mut *spikes.lock().unwrap_or_else(PoisonError::into_inner));
                 profile.warnings.extend(unusual(&spikes, &capture, &profile));
+                if self.puts_marks_right {
+                    profile = put_right::marks::recounted(profile, |by| {
+                        let spikes = Mutex::default();
+                        let stream = self.recorded(NonZeroUsize::MIN, index, setup, by, &spikes)?;
+                        self.averager.average_requested(stream, wanted)
+                    });
+                }
                 profiles.push(profile);
                 Ok(profiles)
             });

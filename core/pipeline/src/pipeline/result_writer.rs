@@ -16,7 +16,7 @@ use crate::{
     stage::{About, Completed, Export, Exporter, PointSeparator, ResultInfo, Takes},
     summary::{LostOrders, NamedValue, PartSummary, Summary, SurfaceSummary},
 };
-use runout_closed_loop::diagnosis::{self, Correction, Diagnosis};
+use runout_closed_loop::{correction::Correction, diagnosis, diagnosis::Diagnosis};
 use runout_consistency::Check;
 use runout_error::{Error, Result};
 use runout_evaluate::{self as values, Evaluate, Evaluated, EvaluatedStation, Group, height_grid::HeightGrid};

@@ -153,7 +153,7 @@ mod tests {
             section: "a".into(),
             ..SensorConfig::default()
         };
-        let setup = |id: &str, part_deg: f64| SetupConfig { id: id.into(), part_deg, sensors_deg: 0.0 };
+        let setup = |id: &str, part_deg: f64| SetupConfig { id: id.into(), part_deg, ..SetupConfig::default() };
         let config = RigConfig {
             interruptions: Vec::new(),
             part_radius_mm: 30.0,

@@ -91,8 +91,6 @@ pub struct StationDiagnosis {
     pub before: Vec<Separation>,
     /// Of the final one.
     pub after: Vec<Separation>,
-    /// Setups of the rig in which the final model takes out the phase that all orders share over the turns.
-    pub turned_back: Vec<usize>,
 }
 
 /// One axial station, measured in every setup of the rig.

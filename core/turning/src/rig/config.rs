@@ -14,6 +14,8 @@ const MOST_INTERRUPTED_DEG: f64 = 120.0;
 const LARGEST_DEG: f64 = 36_000.0;
 /// A kilometre: lengths above it are a mistake.
 const FARTHEST_MM: f64 = 1e6;
+/// Beyond, marks are of something else.
+const TURNS_PER_MARK: std::ops::RangeInclusive<f64> = 0.01..=100.0;
 /// Share of a circle that has to be there.
 const LEAST_LEFT: f64 = 0.5;
 const ANGLES_LOOKED_AT: usize = 3600;
@@ -134,16 +136,23 @@ pub struct SetupConfig {
     /// Angle by which all sensors were moved, in degrees.
     #[serde(default)]
     pub sensors_deg: f64,
+    /// Turns of the part from one mark to the next: 0.5 with two marks a turn. At the first mark, the angle is the declared one.
+    #[serde(default = "one", skip_serializing_if = "is_one")]
+    pub turns_per_mark: f64,
+}
+
+impl Default for SetupConfig {
+    fn default() -> Self {
+        Self { id: String::new(), part_deg: 0.0, sensors_deg: 0.0, turns_per_mark: one() }
+    }
 }
 
 fn default_section() -> String {
     "a".into()
 }
-
 fn default_sign() -> i8 {
     1
 }
-
 fn one() -> f64 {
     1.0
 }
@@ -252,7 +261,11 @@ impl RigConfig {
             }
             let part_rad = radians(setup.part_deg).map_err(|message| fault("part_deg", message))?;
             let sensors_rad = radians(setup.sensors_deg).map_err(|message| fault("sensors_deg", message))?;
-            setups.push(Setup { id: setup.id, part_rad, sensors_rad });
+            let turns_per_mark = setup.turns_per_mark;
+            if !TURNS_PER_MARK.contains(&turns_per_mark) {
+                return Err(fault("turns_per_mark", format!("expected 0.01 to 100 turns, found {turns_per_mark}")));
+            }
+            setups.push(Setup { id: setup.id, part_rad, sensors_rad, turns_per_mark });
         }
         let gaps = gaps_of(&self.interruptions, &sections, &faces)?;
         let (part_radius_mm, rotation) = (self.part_radius_mm, self.rotation);

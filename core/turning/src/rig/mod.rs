@@ -95,6 +95,8 @@ pub struct Setup {
     pub part_rad: f64,
     /// σ, in rad.
     pub sensors_rad: f64,
+    /// Turns of the part from one mark to the next.
+    pub turns_per_mark: f64,
 }
 
 impl Rig {

@@ -90,7 +90,7 @@ mod tests {
         let setup = |(index, part_deg): (usize, &f64)| SetupConfig {
             id: format!("k{index}"),
             part_deg: *part_deg,
-            sensors_deg: 0.0,
+            ..SetupConfig::default()
         };
         let config = RigConfig {
             interruptions: Vec::new(),

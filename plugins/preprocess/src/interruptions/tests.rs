@@ -28,7 +28,7 @@ fn rig() -> Rig {
         part_radius_mm: 30.0,
         rotation: Rotation::Ccw,
         sensors: vec![sensor("S1", 0.0), sensor("S2", 90.0)],
-        setups: vec![SetupConfig { id: "initial".into(), part_deg: 0.0, sensors_deg: 0.0 }],
+        setups: vec![SetupConfig { id: "initial".into(), ..SetupConfig::default() }],
     };
     let mut gaps = Gaps::default();
     gaps.add(352_f64.to_radians(), 12_f64.to_radians());

@@ -4,7 +4,6 @@ use std::sync::Arc;
 
 use runout_core::{
     Complex64, Error, ErrorKind, Result,
-    consistency::turns::{Course, PhaseCourse},
     model::{Effect, Setting},
     profile::{self, Profile, Split},
     stage::Station,
@@ -120,10 +119,6 @@ pub(crate) struct StationData {
     /// Sensor, mean creep a turn where it is largest and its standard uncertainty, where the levels show a drift for certain: one observation
     /// more, since a creep of one sensor can look like a motion in the averaged turn.
     pub creeps: Vec<(usize, f64, f64)>,
-    /// Setup and phase that all orders share over its turns, where these show one for certain: one observation more.
-    pub phases: Vec<(usize, PhaseCourse)>,
-    /// Turns of each setup that are fitted, and held out.
-    turns: Vec<[usize; 2]>,
     /// Covariance of the averages with the drifts that single turns show still in it.
     unsteadied: Option<Vec<Vec<Complex64>>>,
 }
@@ -234,8 +229,6 @@ impl StationData {
             Some((sensor, creep, std))
         });
         let creeps = creeps.collect();
-        let phase_of = |(setup, course): (usize, &Course)| Some((setup, course.phase?));
-        let phases = readings.courses.iter().enumerate().filter_map(phase_of).collect();
         smooth_by_order(&mut readings);
         seen.changes.iter().for_each(|change| change.widen(&mut readings));
         let held_out =
@@ -248,24 +241,7 @@ impl StationData {
         let Weighed { readings, weights, floor, carried } = Weighed::new(layout, selection, readings);
         let name = fit.name.clone();
         let unsteadied = None;
-        let held = |setup: usize| held_out.as_ref().map_or(0, |readings| readings.turns[setup]);
-        let turns = readings.turns.iter().enumerate().map(|(setup, fitted)| [*fitted, held(setup)]).collect();
-        Ok(Self {
-            name,
-            part,
-            readings,
-            held_out,
-            weights,
-            floor,
-            carried,
-            freed,
-            seen,
-            leaks,
-            creeps,
-            phases,
-            turns,
-            unsteadied,
-        })
+        Ok(Self { name, part, readings, held_out, weights, floor, carried, freed, seen, leaks, creeps, unsteadied })
     }
 
     /// Effects as they act on the turns fitted, or on those held out: a creep differs between setups and slows down.
@@ -274,37 +250,23 @@ impl StationData {
         for (sensor, creeping) in altered.sensors.iter_mut().zip(&self.seen.creeping) {
             sensor.creep_shares = creeping.as_ref().map_or_else(Vec::new, |creeping| creeping.shares(turns, self.part));
         }
-        for (setup, [fitted, held_out]) in altered.setups.iter_mut().zip(&self.turns) {
-            let [from, to] = if turns == Part::HeldOut { [*fitted, fitted + held_out] } else { [0, *fitted] };
-            setup.turning.turns = [from, to].map(|turn| turn as f64);
-        }
         altered
     }
 
-    /// What effects leave of the drifts, phases and lines that single turns show, in standard uncertainties.
+    /// What effects leave of the drifts and lines that single turns show, in standard uncertainties.
     pub(crate) fn beside_averages(&self, alterations: &Alterations) -> Vec<f64> {
         let creeps =
             self.creeps.iter().map(|(sensor, creep, std)| (creep - alterations.sensors[*sensor].creep_um) / std);
-        let phases = self.phases.iter().flat_map(|(setup, phase)| {
-            let turning = &alterations.setups[*setup].turning;
-            let (run, step) = (phase.by_rad - turning.run_rad, phase.by_rad - turning.step_rad);
-            match phase.step_at {
-                None => vec![run / phase.std_rad],
-                // Without a step, there is no place of it.
-                Some(_) if turning.step_rad == 0.0 => vec![step / phase.std_rad, 0.0],
-                Some([turns, std]) => vec![step / phase.std_rad, (turns - turning.step_at) / std],
-            }
-        });
         let lines = self.seen.lines.iter().enumerate().map(|(number, line)| {
             let (sensor, evidence) = line.row();
             if alterations.lines.contains(&(number, sensor)) { 0.0 } else { evidence.sqrt() }
         });
-        creeps.chain(phases).chain(lines).collect()
+        creeps.chain(lines).collect()
     }
 
     /// Whether single turns show what the average of the turns does not.
     fn is_seen_besides(&self) -> bool {
-        !self.creeps.is_empty() || !self.phases.is_empty() || !self.seen.lines.is_empty()
+        !self.creeps.is_empty() || !self.seen.lines.is_empty()
     }
 
     /// Leaves out the orders above `max_order`.

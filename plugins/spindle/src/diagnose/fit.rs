@@ -214,12 +214,6 @@ impl Fit for SpindleFit {
                     let creep = kind.creep_partials(place.index, *sensor).get(parameter).copied();
                     -creep.unwrap_or(0.0) / std
                 }));
-                column.extend(self.shared.data[index].phases.iter().flat_map(|(setup, phase)| {
-                    let partials = kind.phase_partials(place.index, *setup, phase);
-                    let [of_phase, of_place] = partials.get(parameter).copied().unwrap_or_default();
-                    let of_place = phase.step_at.map(|[_, std]| -of_place / std);
-                    std::iter::once(-of_phase / phase.std_rad).chain(of_place)
-                }));
                 column.extend(self.shared.data[index].seen.lines.iter().map(|_| 0.0));
             }
         }

@@ -20,7 +20,6 @@ use std::sync::Arc;
 
 use runout_core::{
     Complex64, Result,
-    consistency::turns::PhaseCourse,
     model::{
         Effect, Fit, Model, Setting,
         closed_loop::{self, Settings},
@@ -200,13 +199,6 @@ impl Model for SpindleModel {
 
     fn start(&self, effect: usize, applied: &[Setting]) -> Option<Vec<f64>> {
         let (kind, place) = (self.traced.kind(effect), &self.traced.places[effect]);
-        // A phase that single turns show is as large as they show it.
-        let phases = self.traced.data.iter().flat_map(|station| &station.phases);
-        let is_this =
-            |(setup, phase): &&(usize, PhaseCourse)| !kind.phase_partials(place.index, *setup, phase).is_empty();
-        if let Some((_, phase)) = phases.into_iter().find(is_this) {
-            return Some(kind.at_phase(phase));
-        }
         let values = kind.far_values();
         let data = self.traced.data.first().filter(|_| !values.is_empty())?;
         let (alterations, alter) = (self.alterations(applied), |value: f64, alterations: &mut Alterations| {
@@ -307,14 +299,7 @@ fn run(model: &SpindleModel, stations: &[Station], settings: &Settings) -> Resul
             !model.traced.data.iter().any(has)
         })
     };
-    let no_phase = |place: &data::Place| {
-        let kind = &model.traced.kinds[place.kind];
-        let is_seen =
-            |(setup, phase): &(usize, PhaseCourse)| !kind.phase_partials(place.index, *setup, phase).is_empty();
-        kind.turn_evidence() == Some(TurnEvidence::Phase)
-            && !model.traced.data.iter().any(|station| station.phases.iter().any(is_seen))
-    };
-    let not_shown = |place: &data::Place| no_line(place) || steady(place) || no_phase(place);
+    let not_shown = |place: &data::Place| no_line(place) || steady(place);
     let left_out = |place: &data::Place| not_shown(place) || (slipped(place) && !of_turns(model, place));
     let places = model.traced.places.iter().enumerate().filter(|(_, place)| left_out(place));
     let left_out = places.map(|(index, _)| index).chain(settings.left_out.iter().copied()).collect();
@@ -366,10 +351,7 @@ fn run(model: &SpindleModel, stations: &[Station], settings: &Settings) -> Resul
         diagnosis.warnings.insert(0, NOTHING_SEPARATED.into());
     }
     diagnosis.warnings.extend(model.traced.warnings());
-    let altered = model.alterations(&closed.settings).setups;
-    let turned_back = altered.iter().zip(&selection.setups).filter(|(setup, _)| setup.turning.is_there());
     Ok(StationDiagnosis {
-        turned_back: turned_back.map(|(_, setup)| *setup).collect(),
         diagnosis,
         before: closed.before.separations(stations),
         after: closed.after.separations(stations),

@@ -58,11 +58,6 @@ impl Solved {
             }
         }
         let altered = data.altered(alterations, data.part);
-        for (course, setup) in corrected.courses.iter_mut().zip(&altered.setups) {
-            if setup.turning.is_there() {
-                *course = course.without_phase();
-            }
-        }
         altered.correct(layout, &mut corrected);
         let max_order = corrected.max_order;
         // Displacements are weighed by the noise of the readings that they were.

@@ -35,7 +35,7 @@ impl Alterations {
     /// Reading over displacement at an order.
     #[must_use]
     pub fn response(&self, reading: &Reading, order: usize) -> Complex64 {
-        self.sensors[reading.sensor].response(reading.setup, order) * self.setups[reading.setup].turning.response(order)
+        self.sensors[reading.sensor].response(reading.setup, order)
     }
 
     /// Slope of the characteristic, reading over displacement, in the mean over the turn, `[reading]`: what noise of a reading is in its
@@ -124,12 +124,10 @@ impl Alterations {
     fn correct_covariance(&self, readings: &mut Readings, slopes: &[f64]) {
         let sensors = self.sensors.len();
         for (setup, matrices) in readings.covariance.iter_mut().flatten().enumerate() {
-            let turning = &self.setups[setup].turning;
             for (order, matrix) in matrices.chunks_exact_mut(sensors * sensors).enumerate() {
                 let of_sensors = self.sensors.iter().zip(&slopes[setup * sensors..]);
-                let responses: Vec<Complex64> = of_sensors
-                    .map(|(sensor, slope)| sensor.response(setup, order) * turning.response(order) * slope)
-                    .collect();
+                let responses: Vec<Complex64> =
+                    of_sensors.map(|(sensor, slope)| sensor.response(setup, order) * slope).collect();
                 for (row, one) in matrix.chunks_exact_mut(sensors).zip(&responses) {
                     row.iter_mut().zip(&responses).for_each(|(entry, other)| *entry /= one * other.conj());
                 }

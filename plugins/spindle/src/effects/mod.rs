@@ -28,21 +28,18 @@ mod sensors_angle;
 mod setup_motion_change;
 mod speed_ripple;
 mod thermal_drift;
-mod turning_phase;
 mod unlike_shares;
 
 use std::sync::Arc;
 
 use runout_core::{
     Complex64,
-    consistency::turns::PhaseCourse,
     effects::EffectEntry,
     model::{Parameter, diagnosis::Estimated, in_tolerances},
     rig::Rig,
 };
 
 pub use crate::alterations::{Alterations, Harmonic, Pattern, PatternOf, SensorAlteration, SetupAlteration, Transfer};
-pub use crate::turning::Turning;
 pub use correct::creep;
 use mistakes::ordered_pairs;
 pub use mistakes::{Mistake, pair_of, pairs};
@@ -75,17 +72,6 @@ pub trait SpindleEffect: Send + Sync {
     /// ∂(mean creep of a sensor over one turn, in µm)/∂(parameter): the levels of the turns observe it besides the averaged turn.
     /// Nothing where the effect changes no level.
     fn creep_partials(&self, _target: usize, _sensor: usize) -> Vec<f64> {
-        Vec::new()
-    }
-
-    /// ∂(phase that all orders of a setup share, in rad)/∂(parameter), and ∂(turn at which it steps)/∂(parameter): single turns observe
-    /// them. Nothing where the effect is no such phase.
-    fn phase_partials(&self, _target: usize, _setup: usize, _phase: &PhaseCourse) -> Vec<[f64; 2]> {
-        Vec::new()
-    }
-
-    /// Its values where it is such a phase.
-    fn at_phase(&self, _phase: &PhaseCourse) -> Vec<f64> {
         Vec::new()
     }
 
@@ -143,7 +129,7 @@ pub trait SpindleEffect: Send + Sync {
     fn line(&self) -> Option<usize> {
         match self.turn_evidence()? {
             TurnEvidence::Line(number) => Some(number),
-            TurnEvidence::Levels | TurnEvidence::Phase => None,
+            TurnEvidence::Levels => None,
         }
     }
 
@@ -158,8 +144,6 @@ pub trait SpindleEffect: Send + Sync {
 pub enum TurnEvidence {
     /// The levels of the turns creep.
     Levels,
-    /// All orders share a phase that runs or steps.
-    Phase,
     /// The spectrum of the turns has a line: its number among those found.
     Line(usize),
 }
@@ -304,8 +288,6 @@ pub fn all() -> Vec<Arc<dyn SpindleEffect>> {
         Arc::new(sensors_angle::SensorsAngle),
         Arc::new(setup_motion_change::SetupMotionChange),
         Arc::new(thermal_drift::ThermalDrift),
-        Arc::new(turning_phase::TurningPhase::TurnRatio),
-        Arc::new(turning_phase::TurningPhase::LostSamples),
         Arc::new(even_order_motion::EvenOrderMotion),
         Arc::new(second_order_geometry::SecondOrderGeometry),
     ];

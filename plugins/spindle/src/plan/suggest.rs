@@ -116,7 +116,7 @@ impl Addition {
                 {
                     return None;
                 }
-                rig.setups.push(Setup { id: "added".into(), part_rad, sensors_rad });
+                rig.setups.push(Setup { id: "added".into(), part_rad, sensors_rad, turns_per_mark: 1.0 });
             }
             Self::Sensor { section, angle_deg } => {
                 // On the axis there is one place.

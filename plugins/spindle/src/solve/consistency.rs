@@ -27,6 +27,9 @@ const CLASSES: f64 = (SMOOTHING + 1) as f64;
 /// Turns from which single orders are judged: with fewer, most frequencies between two orders are neighbours, and a tone of asynchronous motion
 /// next to a whole order cannot be distinguished from it.
 const FEWEST_TURNS: usize = 8;
+/// Share of the noise of all orders below which what one order has more refutes no value: it is named, and is in the uncertainty of that order. A
+/// tone of asynchronous motion at a whole order, to a part of a period over the recording, is no more.
+const LITTLE: f64 = 0.05;
 /// Degrees of freedom of the noise of all orders together, at most and at least: the few turns' scatter that weights are taken from biases it by
 /// some percent however many orders there are, and asynchronous motion of low frequency makes it scatter as from so few.
 const MOST_FREEDOM: f64 = 400.0;
@@ -74,8 +77,12 @@ pub(super) fn judge(residual: &mut Residual, turns: &[usize], sensors: usize, or
         }
         let checks = said("orders", &groups, all, level, "the noise there is overestimated");
         // Less than the noise is no finding of an order: a low-pass leaves less than what its covariance is at least.
-        let above = checks.into_iter().filter(|check| check.statistic > 1.0);
-        single.extend(above.map(|check| check.among(CLASSES as usize)));
+        let above = checks.into_iter().filter(|check| check.statistic > 1.0).map(|check| check.among(CLASSES as usize));
+        single.extend(above.map(|check| {
+            let order = known.iter().find(|order| name(order) == check.of);
+            let excess = order.map_or(f64::INFINITY, |order| (check.statistic - 1.0) * order.expected);
+            if excess < LITTLE * whole { check.named() } else { check }
+        }));
     }
     // Of those that are as they should be, the least likely one is enough.
     single.sort_by(|a, b| a.p.total_cmp(&b.p));
@@ -123,9 +130,13 @@ impl Weights {
     }
 }
 
+fn name(order: &OrderResidual) -> String {
+    format!("order {}", order.order)
+}
+
 fn group(order: &OrderResidual) -> Group {
     let freedom = order.dof as f64;
-    Group { name: format!("order {}", order.order), squares: order.chi2_per_dof() * freedom, freedom }
+    Group { name: name(order), squares: order.chi2_per_dof() * freedom, freedom }
 }
 
 #[cfg(test)]

@@ -25,7 +25,7 @@ pub(crate) fn campaign(seed: u64, effects: &str) -> SpindleConfig {
         sign: 1,
         ..SensorConfig::default()
     };
-    let setup = |(id, part_deg): (&str, f64)| SetupConfig { id: id.into(), part_deg, sensors_deg: 0.0 };
+    let setup = |(id, part_deg): (&str, f64)| SetupConfig { id: id.into(), part_deg, ..SetupConfig::default() };
     let rig = RigConfig {
         interruptions: Vec::new(),
         part_radius_mm: 30.0,

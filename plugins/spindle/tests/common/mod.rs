@@ -27,6 +27,7 @@ pub(crate) fn rig(sensors: &[(f64, f64, &str)], setups: &[(f64, f64)]) -> Rig {
         id: format!("k{index}"),
         part_deg: *part_deg,
         sensors_deg: *sensors_deg,
+        ..SetupConfig::default()
     });
     let config = RigConfig {
         interruptions: Vec::new(),

@@ -98,13 +98,13 @@ impl Chance {
         let setup = self.later_setup(config);
         let targets = vec![setup.clone()];
         if id == "turn-ratio" {
-            let turning_deg = self.signed(2e-4, 0.2, false);
+            let turning_deg = self.signed(2e-4, 20.0, false);
             let parameters = vec![("turning", turning_deg)];
             let planted = planted("turn-ratio", Some(&setup), parameters, format!("{turning_deg:+.4}°/rev"));
             return (Effect::TurnRatio(TurnRatio { targets, turning_deg, declared: false }), planted);
         }
         let turns = config.recording.revolutions as f64;
-        let (angle_deg, after_turns) = (self.size(0.01, 20.0), turns * self.between(0.2, 0.7));
+        let (angle_deg, after_turns) = (self.size(0.01, 120.0), turns * self.between(0.2, 0.7));
         let parameters = vec![("lost", angle_deg), ("after", after_turns)];
         let size = format!("{angle_deg:.3}° after {after_turns:.1} turns");
         let planted = planted("lost-samples", Some(&setup), parameters, size);

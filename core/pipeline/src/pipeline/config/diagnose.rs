@@ -8,7 +8,7 @@ use std::{
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::stage::SourceKind;
+use crate::{pipeline::put_right, stage::SourceKind};
 use runout_closed_loop::{Effect, Setting, closed_loop::Settings};
 use runout_error::fault::{Fault, known_names};
 
@@ -148,7 +148,8 @@ impl DiagnoseConfig {
             Effects::Word(AllEffects::All) => None,
             Effects::Some(chosen) => {
                 for (index, id) in chosen.iter().enumerate() {
-                    exists(id, effects).map_err(|fault| fault.under_item("effects", index))?;
+                    exists(id, ids(effects).chain(of_recordings(kind).iter().copied()))
+                        .map_err(|fault| fault.under_item("effects", index))?;
                 }
                 Some(chosen)
             }
@@ -181,9 +182,18 @@ impl Diagnose {
     }
 }
 
+fn ids(effects: &[Effect]) -> impl Iterator<Item = &str> {
+    effects.iter().map(|effect| effect.id.as_str())
+}
+
+/// Mistakes of recordings, which are put right before the loop.
+fn of_recordings(kind: SourceKind) -> &'static [&'static str] {
+    if matches!(kind, SourceKind::Turns) { &put_right::IDS } else { &[] }
+}
+
 /// Refuses an id that no effect has.
-fn exists(id: &str, effects: &[Effect]) -> Result<(), Fault> {
-    let mut ids: Vec<&str> = effects.iter().map(|effect| effect.id.as_str()).collect();
+fn exists<'a>(id: &str, ids: impl Iterator<Item = &'a str>) -> Result<(), Fault> {
+    let mut ids: Vec<&str> = ids.collect();
     ids.sort_unstable();
     ids.dedup();
     if ids.contains(&id) {
@@ -194,7 +204,7 @@ fn exists(id: &str, effects: &[Effect]) -> Result<(), Fault> {
 
 impl KnownEffect {
     fn setting(&self, effects: &[Effect]) -> Result<Setting, Fault> {
-        exists(&self.effect, effects).map_err(|fault| fault.under("effect"))?;
+        exists(&self.effect, ids(effects)).map_err(|fault| fault.under("effect"))?;
         let of_this_id = || effects.iter().enumerate().filter(|(_, effect)| effect.id == self.effect);
         let at = |targets: &[String]| if targets.is_empty() { "none".into() } else { targets.join(" ") };
         let named: Vec<String> =

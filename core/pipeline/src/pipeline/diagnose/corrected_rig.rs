@@ -12,7 +12,7 @@ use crate::{
         document::{ConfigError, Document, Sources, checked, table_text},
     },
 };
-use runout_closed_loop::diagnosis::Correction;
+use runout_closed_loop::correction::Correction;
 use runout_error::{Error, Result};
 use runout_turning::{provenance::VERSION, rig::RigConfig};
 

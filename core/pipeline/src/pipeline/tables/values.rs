@@ -3,7 +3,7 @@
 use serde_json::json;
 
 use crate::summary::{NamedValue, Summary};
-use runout_closed_loop::diagnosis::Correction;
+use runout_closed_loop::correction::Correction;
 use runout_consistency::Check;
 use runout_draws::Uncertainty;
 use runout_error::Result;

@@ -24,7 +24,7 @@ fn sensor(id: &str, angle_deg: f64, z_mm: f64, section: &str) -> SensorConfig {
 }
 
 fn setup(id: &str, part_deg: f64, sensors_deg: f64) -> SetupConfig {
-    SetupConfig { id: id.into(), part_deg, sensors_deg }
+    SetupConfig { id: id.into(), part_deg, sensors_deg, ..SetupConfig::default() }
 }
 
 /// Two sensors in each of two sections, part turned between two setups.
