@@ -14,22 +14,20 @@ use std::f64::consts::TAU;
 
 use runout_core::{
     Complex64, Result,
-    draws::{seed, stands_out},
+    draws::{DrawnErrors, Draws, Interval, Measured, Uncertainty, seed},
     fault::Fault,
     numerics::fourier::Fourier,
     pipeline::{Context, StageConfig},
     points::{PointColumn, PointKind::Number, Points},
     stage::{Outcome, PointSeparator, Separator},
     standards::roundness::{self, Angles, Reference},
+    summary::NamedValue,
     table::{ColumnSpec, Figure, Measure, TableRows, TableSpec, numbers, texts},
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::{
-    draws::{Computed, Draw, Machine, with_uncertainty, without_noise},
-    paths::{Paths, mean_of, refused},
-};
+use crate::paths::{Paths, mean_of, refused};
 
 /// `[separate] plugin = "circular"`.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
@@ -97,37 +95,16 @@ impl PointSeparator for Circular {
         let paths = Paths::of(points)?;
         let of_means: Vec<Vec<f64>> = paths.turns.iter().map(|turns| mean_of(turns)).collect();
         let values = self
-            .values(&paths, &of_means, 0.0)
+            .values(&paths, &of_means)
             .ok_or_else(|| refused(points, "its points have no reference circle".into()))?;
-        let computed = values.into_iter().map(|(symbol, value, about)| {
-            let is_key = symbol.starts_with('G') || symbol == "H";
-            let least = if matches!(symbol.as_str(), "D" | "F_max" | "F_min") { f64::NEG_INFINITY } else { 0.0 };
-            Computed { symbol, value, about, is_key, least }
-        });
-        let computed: Vec<Computed> = computed.collect();
-        let noise = Noise::of(&paths.turns, paths.angles);
-        let values_of = |means: &[Vec<f64>], longer_um: f64| -> Vec<f64> {
-            let values = self.values(&paths, means, longer_um);
-            values.map_or_else(
-                || vec![f64::NAN; computed.len()],
-                |values| values.into_iter().map(|(_, value, _)| value).collect(),
-            )
-        };
-        let least = noise.taken_out(&of_means, &paths.turns);
-        let truth = [&least, &of_means].map(|means| values_of(means, 0.0));
-        let error = |machine: Machine, draw: &mut Draw| -> Vec<f64> {
-            let (means, truth) = if machine == Machine::Least { (&least, &truth[0]) } else { (&of_means, &truth[1]) };
-            let again = noise.added_to(means, &paths.turns, draw);
-            let again = values_of(&again, self.0.radius_std_um * draw.normal());
-            again.iter().zip(truth).map(|(again, truth)| again - truth).collect()
-        };
         let mut remarks = paths.remarks.clone();
         let several = paths.turns.iter().all(|turns| turns.len() > 1);
+        let noise = Noise::of(&paths.turns, paths.angles);
         let copies = several && noise.is_none();
         if copies {
             remarks.push("the turns are identical: copies show no uncertainty".into());
         }
-        let known = several && !copies;
+        let known = if several && !copies { self.known(&paths, &of_means, &noise) } else { Vec::new() };
         if !several {
             remarks.push(
                 "one turn in a direction: nothing shows its uncertainty; record two or more turns in each direction"
@@ -139,17 +116,22 @@ impl PointSeparator for Circular {
                 "the path was recorded in one direction: there is no hysteresis and no bidirectional value".into(),
             );
         }
-        let mut values = with_uncertainty(&computed, "um", seed(&["circular", &self.0.plane]), error);
-        for value in values.iter_mut().filter(|_| !known) {
-            (value.std, value.interval_95) = (None, None);
-        }
+        let named = |(index, (symbol, value, about)): (usize, (String, f64, &'static str))| {
+            let known = known.get(index).and_then(|known| known.at(value));
+            let known =
+                known.map(|known| if symbol.starts_with(['D', 'F']) { self.of_any_length(known) } else { known });
+            let std = known.as_ref().map_or(f64::NAN, |known| known.std);
+            let mut named = NamedValue::new(&symbol, value, std, "um", about).of(&self.0.plane);
+            named.interval_95 = known.map(|known| known.interval_95);
+            if symbol.starts_with('G') || symbol == "H" { named.key() } else { named }
+        };
         Ok(Outcome {
             convention: format!(
                 "deviation is radius less the nominal one of {} mm; + is counter-clockwise, from the first axis of {} towards the second",
                 self.0.radius_mm, self.0.plane
             ),
             tables: vec![rows(&paths, &of_means)?],
-            values: values.into_iter().map(|value| value.of(&self.0.plane)).collect(),
+            values: values.into_iter().enumerate().map(named).collect(),
             remarks,
             ..Outcome::default()
         })
@@ -157,8 +139,47 @@ impl PointSeparator for Circular {
 }
 
 impl Circular {
-    /// The values of paths; nothing where they have no reference circle. `longer_um` is what the instrument is longer by than it says.
-    fn values(&self, paths: &Paths, means: &[Vec<f64>], longer_um: f64) -> Option<Vec<(String, f64, &'static str)>> {
+    /// What is known of each of the values: both paths are drawn together, each with its own errors.
+    fn known(&self, paths: &Paths, means: &[Vec<f64>], noise: &Noise) -> Vec<Interval> {
+        let mut fourier = Fourier::new(paths.angles);
+        let seed_of = |sign: i8| seed(&["circular", &self.0.plane, if sign > 0 { "+" } else { "-" }]);
+        let mut measured = Vec::new();
+        let mut sources = Vec::new();
+        for ((mean, turns), sign) in means.iter().zip(&paths.turns).zip(&paths.signs) {
+            let mut harmonics = vec![Complex64::ZERO; noise.variance.len()];
+            fourier.analyse(mean.iter().copied(), &mut harmonics);
+            let variance: Vec<f64> = noise.variance.iter().map(|variance| variance / turns.len() as f64).collect();
+            sources.push(vec![(seed_of(*sign), variance.iter().map(|variance| variance.sqrt().into()).collect())]);
+            measured.push(Measured { harmonics, squares: vec![noise.squares; variance.len()], variance, lowest: 0 });
+        }
+        let Some(draws) = Draws::of(&measured, sources, seed_of(1)) else { return Vec::new() };
+        let profiles = draws.profiles(|_| Complex64::ONE, paths.angles, |_, _| ());
+        profiles.values(|kind, errors, found| {
+            let means: Vec<Vec<f64>> = match errors {
+                None => profiles.undisturbed_um(kind).to_vec(),
+                Some(errors) => {
+                    let of_path = |(mean, errors): (&Vec<f64>, &DrawnErrors)| {
+                        let mut sum = Vec::with_capacity(mean.len());
+                        errors.added_to(mean, &mut sum);
+                        sum
+                    };
+                    profiles.undisturbed_um(kind).iter().zip(errors).map(of_path).collect()
+                }
+            };
+            let values = self.values(paths, &means);
+            found.extend(values.into_iter().flatten().map(|(_, value, _)| value));
+        })
+    }
+
+    /// The uncertainty of a value that has the instrument's length in it.
+    fn of_any_length(&self, known: Uncertainty) -> Uncertainty {
+        let std = known.std.hypot(self.0.radius_std_um);
+        let factor = if known.std > 0.0 { std / known.std } else { 1.0 };
+        Uncertainty { std, ..known.widened(factor) }
+    }
+
+    /// The values of paths; nothing where they have no reference circle.
+    fn values(&self, paths: &Paths, means: &[Vec<f64>]) -> Option<Vec<(String, f64, &'static str)>> {
         let mut points = roundness::Points::default();
         let count = paths.angles;
         let one = || (0..count).map(move |angle| TAU * angle as f64 / count as f64);
@@ -185,7 +206,7 @@ impl Circular {
             values.insert(1, ("H".into(), widest, "circular hysteresis (ISO 230-4)"));
         }
         // The circle about the least-squares centre that the nominal one is.
-        let deviation = circle.deviation_um - longer_um;
+        let deviation = circle.deviation_um;
         values.push(("D".into(), deviation, "mean bidirectional radial deviation (ISO 230-4)"));
         let from_nominal = || about.iter().map(|one| one + deviation);
         values.push((
@@ -204,17 +225,13 @@ impl Circular {
 
 /// Variance below which turns are copies: of rounding.
 const IDENTICAL_UM2: f64 = 1e-24;
-/// Orders of which a turn is off by as a whole: by an error of its own shape. Above, errors are of any phase.
-const OF_A_TURN: usize = 8;
 
 /// What changes from turn to turn, by order.
 struct Noise {
     /// Variance of one turn's coefficient, real and imaginary part together, from order 0; the same in both directions.
     variance: Vec<f64>,
-    /// Complex numbers behind each.
-    freedom: usize,
-    /// Low orders of each turn less their mean, `[direction][turn][order]`.
-    of_turns: Vec<Vec<Vec<Complex64>>>,
+    /// Squares behind each.
+    squares: usize,
 }
 
 impl Noise {
@@ -222,78 +239,21 @@ impl Noise {
         let mut fourier = Fourier::new(angles);
         let mut variance = vec![0.0; fourier.max_order() + 1];
         let mut harmonics = vec![Complex64::ZERO; variance.len()];
-        let mut of_turns = Vec::new();
         let freedom: usize = turns.iter().map(|turns| turns.len() - 1).sum();
         for turns in turns {
             let mean = mean_of(turns);
-            let mut low = Vec::new();
             for turn in turns {
                 fourier.analyse(turn.iter().zip(&mean).map(|(turn, mean)| turn - mean), &mut harmonics);
                 variance.iter_mut().zip(&harmonics).for_each(|(sum, harmonic)| *sum += harmonic.norm_sqr());
-                low.push(harmonics[..OF_A_TURN].to_vec());
             }
-            of_turns.push(low);
         }
         variance.iter_mut().for_each(|sum| *sum /= freedom.max(1) as f64);
-        Self { variance, freedom, of_turns }
+        Self { variance, squares: 2 * freedom }
     }
 
     /// Whether nothing changes: no two recorded turns are alike.
     fn is_none(&self) -> bool {
         self.variance.iter().all(|variance| *variance < IDENTICAL_UM2)
-    }
-
-    /// Means of turns without the power that noise has in each order.
-    fn taken_out(&self, means: &[Vec<f64>], turns: &[Vec<Vec<f64>>]) -> Vec<Vec<f64>> {
-        let mut fourier = Fourier::new(means.first().map_or(1, Vec::len));
-        let mut harmonics = vec![Complex64::ZERO; self.variance.len()];
-        let mut taken = Vec::new();
-        for (mean, turns) in means.iter().zip(turns) {
-            fourier.analyse(mean.iter().copied(), &mut harmonics);
-            let variance: Vec<f64> = self.variance.iter().map(|variance| variance / turns.len() as f64).collect();
-            // An order that stands out is judged by itself; of the others an octave together, since half of all noise is above its mean.
-            let mut first = 1;
-            while first < harmonics.len() {
-                let octave = first..(2 * first).min(harmonics.len());
-                let shines = |order: &usize| stands_out(harmonics[*order], variance[*order]);
-                let (alone, others): (Vec<usize>, Vec<usize>) = octave.clone().partition(shines);
-                let power = |orders: &[usize]| orders.iter().map(|order| harmonics[*order].norm_sqr()).sum::<f64>();
-                let noise = |orders: &[usize]| orders.iter().map(|order| variance[*order]).sum::<f64>();
-                let shares: Vec<(usize, f64)> = alone
-                    .iter()
-                    .map(|order| (*order, without_noise(power(&[*order]), noise(&[*order]))))
-                    .chain(others.iter().map(|order| (*order, without_noise(power(&others), noise(&others)))))
-                    .collect();
-                shares.into_iter().for_each(|(order, share)| harmonics[order] *= share);
-                first = octave.end;
-            }
-            taken.push(fourier.synthesise(harmonics.iter().copied()).to_vec());
-        }
-        taken
-    }
-
-    /// Means of turns with another error of theirs.
-    fn added_to(&self, means: &[Vec<f64>], turns: &[Vec<Vec<f64>>], draw: &mut Draw) -> Vec<Vec<f64>> {
-        let mut fourier = Fourier::new(means.first().map_or(1, Vec::len));
-        let variance: Vec<f64> =
-            self.variance.iter().map(|variance| variance * draw.true_std_ratio(2 * self.freedom).powi(2)).collect();
-        let mut again = Vec::new();
-        for ((mean, turns), of_turns) in means.iter().zip(turns).zip(&self.of_turns) {
-            let count = turns.len() as f64;
-            let widened = draw.true_std_ratio(turns.len() - 1) / (count * (count - 1.0)).sqrt();
-            let by: Vec<f64> = turns.iter().map(|_| widened * draw.normal()).collect();
-            let errors = variance.iter().enumerate().map(|(order, variance)| {
-                if order < OF_A_TURN {
-                    return of_turns.iter().zip(&by).map(|(turn, by)| turn[order] * by).sum();
-                }
-                let std = (0.5 * variance / count).sqrt();
-                Complex64::new(std * draw.normal(), std * draw.normal())
-            });
-            let errors: Vec<Complex64> = errors.collect();
-            let error = fourier.synthesise(errors.iter().copied());
-            again.push(mean.iter().zip(error).map(|(mean, error)| mean + error).collect());
-        }
-        again
     }
 }
 
