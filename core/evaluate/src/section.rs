@@ -107,7 +107,7 @@ pub(super) struct Form {
 const NEGLIGIBLE: f64 = 1e-3;
 
 impl Form {
-    fn of(result: &StationResult, section: usize, radius_mm: f64) -> Option<Self> {
+    pub(super) fn of(result: &StationResult, section: usize, radius_mm: f64) -> Option<Self> {
         let separation = &result.separation;
         let unknown = separation.position(Quantity::Form(section))?;
         let from_two = |harmonics: Vec<Complex64>| {
