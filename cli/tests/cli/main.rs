@@ -28,3 +28,4 @@ mod straightness;
 mod text_recording;
 mod values;
 mod warnings;
+mod widths;

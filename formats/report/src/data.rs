@@ -7,7 +7,12 @@ use runout_core::{
 };
 use serde::Serialize;
 
-use crate::{one_line, symbol, values::Columns};
+use crate::{
+    one_line,
+    shapes::{ArrowsData, CircleData, circles},
+    symbol,
+    values::Columns,
+};
 
 /// Points of a curve that are drawn: more are not visible on a screen.
 const MOST_POINTS: usize = 2880;
@@ -62,6 +67,8 @@ pub(crate) struct PanelData {
     curves: Vec<CurveData>,
     #[serde(skip_serializing_if = "Option::is_none")]
     map: Option<MapData>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    arrows: Option<ArrowsData>,
 }
 
 #[derive(Serialize)]
@@ -81,6 +88,9 @@ struct CurveData {
     /// Whether it is a line where others are points.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     joined: bool,
+    /// Reference circles about which it can be looked at.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    circles: Vec<CircleData>,
 }
 
 /// Heights on a grid, row by row along y.
@@ -104,7 +114,7 @@ pub(crate) struct MapData {
 /// Numbers as short as they can be written.
 #[derive(Serialize)]
 #[serde(untagged)]
-enum Numbers {
+pub(crate) enum Numbers {
     /// All the same.
     Same { same: f64, count: usize },
     /// At equal steps.
@@ -114,7 +124,7 @@ enum Numbers {
 }
 
 impl Numbers {
-    fn of(numbers: &[f64]) -> Self {
+    pub(crate) fn of(numbers: &[f64]) -> Self {
         let count = numbers.len();
         if let (Some(first), Some(last)) = (numbers.first(), numbers.last())
             && count > 2
@@ -148,6 +158,7 @@ impl FigureData {
         match self.kind {
             _ if !self.thinned => None,
             "map" => Some("Of many points, the mean of those in each cell is drawn."),
+            "vectors" => Some("Of many places, some at equal distances are drawn."),
             _ => Some("Of many points, the lowest and the highest of each stretch are drawn."),
         }
     }
@@ -167,7 +178,15 @@ pub(crate) fn figures(all: &[Panels]) -> Vec<FigureData> {
         }
         _ => MOST_POINTS,
     };
-    all.iter().map(|panels| figure(panels, most)).filter(|figure| !figure.panels.is_empty()).collect()
+    let shown = all.iter().filter(|figure| !is_at_one_place(figure));
+    shown.map(|panels| figure(panels, most)).filter(|figure| !figure.panels.is_empty()).collect()
+}
+
+/// Whether nothing is along the horizontal axis: points of one place.
+fn is_at_one_place(figure: &Panels) -> bool {
+    let mut places = figure.drawn.iter().flat_map(|panel| &panel.curves).flat_map(|curve| &curve.points);
+    let first = places.next().map(|point| point.x.to_bits());
+    figure.kind == Kind::Points && places.all(|point| Some(point.x.to_bits()) == first)
 }
 
 fn figure(figure: &Panels, most: usize) -> FigureData {
@@ -177,16 +196,20 @@ fn figure(figure: &Panels, most: usize) -> FigureData {
     let mut panels = Vec::new();
     for panel in &figure.drawn {
         let drawn = |curve: &&Curve| !curve.points.is_empty();
-        let mut data = PanelData { name: one_line(&panel.name), curves: Vec::new(), map: None };
+        let mut data = PanelData { name: one_line(&panel.name), curves: Vec::new(), map: None, arrows: None };
         if figure.kind == Kind::Map {
             let points: Vec<Point> = panel.curves.iter().flat_map(|curve| curve.points.iter().copied()).collect();
             data.map = (!points.is_empty()).then(|| map(figure, &points));
             thinned |= data.map.as_ref().is_some_and(|map| map.thinned);
+        } else if figure.kind == Kind::Vectors {
+            let (arrows, some) = ArrowsData::of(figure, &panel.curves).unzip();
+            data.arrows = arrows;
+            thinned |= some == Some(true);
         } else {
             thinned |= panel.curves.iter().any(|curve| curve.points.len() > most);
             data.curves.extend(panel.curves.iter().filter(drawn).map(|one| curve(&one.thinned(most, scale))));
         }
-        if data.map.is_some() || !data.curves.is_empty() {
+        if data.map.is_some() || data.arrows.is_some() || !data.curves.is_empty() {
             panels.push(data);
         }
     }
@@ -197,6 +220,7 @@ fn figure(figure: &Panels, most: usize) -> FigureData {
         Kind::Points => "points",
         Kind::Bars => "bars",
         Kind::Map => "map",
+        Kind::Vectors => "vectors",
     };
     let (x, y) = (AxisData::of(x, &x.unit), AxisData::of(y, unit));
     let places = figure.places.iter().map(|(x, name)| (*x, one_line(name))).collect();
@@ -216,6 +240,7 @@ fn curve(curve: &Curve) -> CurveData {
         missing: curve.missing.clone(),
         marks: curve.marks.iter().map(|mark| (mark.x, mark.y, one_line(&mark.text))).collect(),
         joined: curve.joined,
+        circles: circles(curve),
     }
 }
 

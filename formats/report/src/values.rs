@@ -123,6 +123,8 @@ fn rows(summary: &Summary) -> Vec<Row> {
             interval: uncertainty.map_or_else(String::new, |known| interval((known.interval_95, known.std))),
             refers: [value.reference.as_str(), value.filter.as_str()].join(", "),
             group: match (placed.station, placed.section) {
+                // Where each section is a station of its own, all sections are alike.
+                (Some(station), Some(section)) if station == section => "sections".into(),
                 (Some(_), Some(section)) => format!("section {}", one_line(section)),
                 (Some(_), None) => "stations".into(),
                 (None, _) => String::new(),

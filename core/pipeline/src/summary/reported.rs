@@ -158,7 +158,7 @@ mod tests {
         let mut own = NamedValue::new("gain", f64::NAN, f64::NAN, "", "gain of the probe").of("probe");
         own.refuted_by = Some("repeats".into());
         let mut summary = Summary { stations: vec![station], values: vec![own], ..Summary::default() };
-        let limits: Vec<LimitSummary> = decide(&[limit(1.0), limit(2.0)], &summary.placed_values()).0;
+        let limits: Vec<LimitSummary> = decide(&[limit(1.0), limit(2.0)], &summary.placed_values()).unwrap().0;
         summary.limits = limits;
         let all = summary.reported_values();
         assert_eq!(all.len(), 5);
