@@ -235,12 +235,17 @@ const Draw = (() => {
   }
 
   const SCALE = "Viridis";
+  const LONGEST_SIDE = 6; // Times the shorter one, of a map that keeps its aspect.
   const bar = (map) => ({ title: { text: label(map.height), side: "right" }, thickness: 14, outlinewidth: 0 });
 
   function map(of, { x, y, rows }) {
     const trace = { type: "heatmap", x, y, z: rows, colorscale: SCALE, colorbar: bar(of), hoverinfo: "none", zsmooth: false };
-    const across = axis(of.x, of.radius_mm ? { dtick: 45, range: [x[0], 360] } : {});
-    return { traces: [trace], layout: layout({ xaxis: across, yaxis: axis(of.y, of.radius_mm ? { range: [y[0], y[y.length - 1]] } : {}), height: 460, margin: { l: 64, r: 8, t: 32, b: 52 } }) };
+    const [wide, tall] = [x, y].map((list) => Math.abs(list[list.length - 1] - list[0]));
+    // Lengths along both axes keep their aspect, unless a side would be too short to be seen.
+    const keeps = !of.radius_mm && of.x.unit === of.y.unit && Math.max(wide, tall) < LONGEST_SIDE * Math.min(wide, tall);
+    const across = axis(of.x, of.radius_mm ? { dtick: 45, range: [x[0], 360] } : keeps ? { constrain: "domain" } : {});
+    const along = of.radius_mm ? { range: [y[0], y[y.length - 1]] } : keeps ? { constrain: "domain", scaleanchor: "x" } : {};
+    return { traces: [trace], layout: layout({ xaxis: across, yaxis: axis(of.y, along), height: 460, margin: { l: 64, r: 8, t: 32, b: 52 } }) };
   }
 
   const MOST_SOLID = 160_000; // Points that a phone can still turn.

@@ -119,12 +119,14 @@ Object.assign(Draw, (() => {
   function sheet({ y: { unit } }, circled) {
     if (!circled.length) return null;
     const { filter, name } = circled[0].circle;
-    const at = ([angle, deviation]) => `${shown(deviation)} at ${angle.toFixed(1)}°`;
-    const off = (circle) => (circle.off ? `${shown(circle.off[0])} to ${circle.off[1].toFixed(1)}°` : "not observable");
+    // As many decimals as RONt has.
+    const fixed = (circle, value) => value.toFixed(Math.min(9, (circle.ront.split(" ")[0].split(".")[1] ?? "").length)).replace("-", "−");
+    const at = (circle, [angle, deviation]) => `${fixed(circle, deviation)} at ${angle.toFixed(1)}°`;
+    const off = (circle) => (circle.off ? `${fixed(circle, circle.off[0])} to ${circle.off[1].toFixed(1)}°` : "not observable");
     return {
       caption: `About ${name}, filter: ${filter}; lengths in ${unit}`,
       head: ["of", "RONt", "peak", "valley", "eccentricity"],
-      rows: circled.map(({ name: curve, circle }) => [curve, circle.ront, at(circle.peak), at(circle.valley), off(circle)]),
+      rows: circled.map(({ name: curve, circle }) => [curve, circle.ront, at(circle, circle.peak), at(circle, circle.valley), off(circle)]),
     };
   }
 

@@ -25,9 +25,11 @@
   function put(place, { traces, layout: { height, ...layout } }) {
     const high = printing ? PAPER.height * height : height;
     place.style.height = `${high}px`;
-    // The first figure has the page's width.
-    const width = place.closest(".first") ? PAPER.wide : PAPER.width;
-    const size = printing ? { autosize: false, width, height: high } : { autosize: true };
+    // The first figure has the page's width; a map shares it with its body in space.
+    const width = place.closest(".first") && !place.closest(".map") ? PAPER.wide : PAPER.width;
+    // A lower chart has its legend farther below, by shares of its height.
+    const legend = { ...layout.legend, y: layout.polar ? -0.2 : -0.38 };
+    const size = printing ? { autosize: false, width, height: high, legend } : { autosize: true };
     return Plotly.react(place, traces, { ...layout, ...size }, CONFIG);
   }
 

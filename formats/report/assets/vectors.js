@@ -51,6 +51,7 @@ Object.assign(Draw, (() => {
     const [component] = arrows.components;
     const ratio = (MM[names[first].unit] ?? 1) / (MM[component[1]] ?? 1);
     const times = longest > 0 ? roundedDown((1.5 * spacing * ratio) / longest) : 1;
+    const head = innerWidth < 640 ? 6 : 10; // Pixels.
     const [x, y, colour, size, text] = [[], [], [], [], []];
     for (const index of kept) {
       const [from, to] = [[place[first][index], place[second][index]], [vector[first][index], vector[second][index]].map((one) => (times * one) / ratio)];
@@ -58,7 +59,7 @@ Object.assign(Draw, (() => {
       x.push(from[0], from[0] + to[0], null);
       y.push(from[1], from[1] + to[1], null);
       colour.push(vector[across][index], vector[across][index], 0);
-      size.push(3, 10, 0);
+      size.push(3, head, 0);
       text.push(said, said, "");
     }
     const [name, unit] = arrows.components[across];
@@ -67,13 +68,13 @@ Object.assign(Draw, (() => {
       type: "scatter", mode: "lines+markers", x, y, text, meta: "values", name: plain(figure.title), line: { color: faint, width: 1 }, showlegend: false,
       marker: {
         symbol: x.map((_, index) => ["circle", "arrow", "circle"][index % 3]), angleref: "previous", size, color: colour, cmin, cmax, colorscale: "Viridis", opacity: 1, line: { width: 0 },
-        colorbar: { title: { text: plain(`${name} / ${unit}`), side: "right" }, thickness: 14, outlinewidth: 0 },
+        colorbar: { title: { text: plain(`${name} / ${unit}`), side: "top" }, orientation: "h", y: -0.22, yanchor: "top", thickness: 10, outlinewidth: 0 },
       },
       hovertemplate: "%{text}<extra></extra>", connectgaps: false,
     };
     const equal = { constrain: "domain" };
     const where = at === null ? "" : `${names[across].name} = ${at} ${names[across].unit}`;
-    const said = [where, `vectors are ${times.toLocaleString("en")} times as long as they are`, `the longest is ${shown(longest)} ${component[1]}`];
+    const said = [where, `vectors are ${times.toLocaleString("en")} times as long as they are`, `the longest of all is ${shown(longest)} ${component[1]}`];
     return {
       traces: [trace], said: said.filter(Boolean).join("; "),
       layout: layout({ xaxis: axis(names[first], equal), yaxis: axis(names[second], { ...equal, scaleanchor: "x" }), height: 480, plot_bgcolor: "rgba(0,0,0,0)", colorway: palette }),

@@ -27,7 +27,7 @@ pub(crate) fn list(summary: &Summary, rig: Option<&Rig>, surface: Option<&Surfac
         add(if rig.is_some() { "Stations" } else { "Sections" }, summary.stations.len().to_string());
     }
     if high > low {
-        add("Sections along z", format!("{} to {} mm", significant(low, 6), significant(high, 6)));
+        add("Sections along z", format!("{} to {} mm", place(low), place(high)));
     }
     if turns[1] > 0 {
         add("Turns used", format!("{} of {}", turns[0], turns[1]));
@@ -49,4 +49,10 @@ pub(crate) fn list(summary: &Summary, rig: Option<&Rig>, surface: Option<&Surfac
     (!facts.is_empty()).then(|| {
         html! { dl.facts { @for (name, value) in &facts { div { dt { (name) } dd { bdi { (value) } } } } } }
     })
+}
+
+/// A place with six digits at most.
+fn place(mm: f64) -> String {
+    let shown = significant(mm, 6);
+    if shown.contains('.') { shown.trim_end_matches('0').trim_end_matches('.').to_owned() } else { shown }
 }
