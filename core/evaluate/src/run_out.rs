@@ -115,7 +115,7 @@ impl Eccentricity {
         let of_angle = clear.map(|std| {
             let std = (std / size_um).to_degrees();
             let reach = student_95(self.freedom as f64) * std;
-            Uncertainty { std, interval_95: [angle_deg - reach, angle_deg + reach], draws: 0 }
+            Uncertainty::new(std, [angle_deg - reach, angle_deg + reach], 0)
         });
         let reference = format!("axis of rotation in {setup}");
         let label = |symbol, unit, source: &str| Label::new(symbol, unit, source, reference.clone());

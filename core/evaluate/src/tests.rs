@@ -673,8 +673,7 @@ fn intervals_of_lines_hold_from_zero_on() {
 
 #[allow(clippy::type_complexity, reason = "taken apart at once by the test")]
 fn limited(limits: &str) -> Vec<(Decision, Vec<(Decision, bool)>, usize)> {
-    let uncertainty =
-        |std: f64, value: f64| Uncertainty { std, interval_95: [value - 2.0 * std, value + 2.0 * std], draws: 400 };
+    let uncertainty = |std: f64, value: f64| Uncertainty::new(std, [value - 2.0 * std, value + 2.0 * std], 400);
     let value = |reference: &str, value: f64, std: Option<f64>| Value {
         symbol: "RONt".into(),
         unit: "um".into(),

@@ -188,7 +188,7 @@
     const columns = Object.fromEntries(Object.entries(data.values).map(([key, column]) => [key, column.texts ? column.rows.map((row) => column.texts[row]) : column]));
     const values = columns.shown.map((_, row) => Object.fromEntries(Object.entries(columns).map(([key, column]) => [key, column[row]])));
     const [filter, count, all] = ["filter", "shown", "all"].map((id) => document.getElementById(id));
-    const keys = ["place", "symbol", "low", "shown", "high", "unit", "interval", "refers", "note"];
+    const keys = ["place", "symbol", "low", "shown", "high", "unit", "interval", "kind", "refers", "note"];
     const numeric = new Set(["low", "shown", "high", "interval"]);
     // What a value is by its standard is a footnote of the rows that are shown: its number is in the row, its text below.
     function footnoted(rows) {
@@ -214,7 +214,7 @@
       const [low, middle, high] = [0, (known.length - 1) >> 1, known.length - 1].map((place) => known[place]);
       const remark = group.some((row) => row.remark.includes("! ")) ? "! refuted at some" : "";
       const several = ["stations", "sections"].includes(first.group) ? `${group.length} ${first.group}` : `${first.group}, ${group.length} stations`;
-      const head = { ...first, key, place: several, low: low.shown, shown: middle.shown, high: high.shown, interval: "", remark, value: middle.value };
+      const head = { ...first, key, place: several, low: low.shown, shown: middle.shown, high: high.shown, interval: "", kind: "", remark, value: middle.value };
       return open.has(key) ? [head, ...group] : [head];
     }
     const show = () => {

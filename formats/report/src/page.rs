@@ -117,7 +117,8 @@ fn table(count: usize) -> Markup {
                             th.number scope="col" { button type="button" data-key="value" { "value ± std" span.several { ", median" } } }
                             th.number.several scope="col" { "highest" }
                             th scope="col" { button type="button" data-key="unit" { "unit" } }
-                            th.number scope="col" { "95 % coverage interval" }
+                            th.number scope="col" { "95 % interval" }
+                            th scope="col" { button type="button" data-key="kind" { "of" } }
                             th scope="col" { button type="button" data-key="refers" { "reference, filter" } }
                             th scope="col" { "note" }
                         }
