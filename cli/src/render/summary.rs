@@ -200,7 +200,7 @@ fn with_uncertainty(value: &Value) -> String {
     }
     // As many decimals as the uncertainty has.
     let number = |number: f64| with_std(number, Some(known.std)).split(' ').next().unwrap_or_default().to_owned();
-    let of = if known.kind == IntervalKind::Prediction { "95 % of other captures" } else { "95 %" };
+    let of = if known.kind == IntervalKind::Prediction { "predicted" } else { "95 %" };
     format!("{} ({of}: {} to {}){mark}", number(value.value), number(low), number(high))
 }
 
