@@ -15,6 +15,7 @@ mod data;
 mod facts;
 mod first;
 mod limits;
+mod numbers;
 mod origin;
 mod overview;
 mod page;

@@ -6,7 +6,7 @@ use runout_core::table::{
 };
 use serde::Serialize;
 
-use crate::{data::Numbers, one_line, symbol};
+use crate::{numbers::Numbers, one_line, symbol};
 
 /// Vectors that a page holds: more are thinned.
 const MOST: usize = 20_000;
