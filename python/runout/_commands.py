@@ -41,7 +41,7 @@ def run(
     Raises `ConfigurationError` for a mistake in the pipeline, `DataError` for data and files. Ctrl-C stops it; nothing
     half-written remains.
     """
-    return Result(*_native.run(job(pipeline, recording, set, plugins), threads, progress, surface))
+    return Result(*job(pipeline, recording, set, plugins).call(_native.run, threads, progress, surface))
 
 
 def diagnose(
@@ -55,7 +55,7 @@ def diagnose(
     plugins: Sequence[Plugin] = (),
 ) -> Diagnosis:
     """Runs the closed loop: finds what the declared model lacks, and adds it. Arguments and exceptions as of `run`."""
-    return Diagnosis(*_native.diagnose(job(pipeline, recording, set, plugins), threads, progress, surface))
+    return Diagnosis(*job(pipeline, recording, set, plugins).call(_native.diagnose, threads, progress, surface))
 
 
 def compare(
@@ -77,7 +77,7 @@ def compare(
         raise TypeError("expected a list of separators, found a string")
     own = [method for method in methods if not isinstance(method, str)]
     names = [method if isinstance(method, str) else method.name for method in methods]
-    return Comparison(_document(_native.compare(job(pipeline, recording, set, [*plugins, *own]), names, threads, progress)))
+    return Comparison(_document(job(pipeline, recording, set, [*plugins, *own]).call(_native.compare, names, threads, progress)))
 
 
 def check(
@@ -88,7 +88,7 @@ def check(
     plugins: Sequence[Plugin] = (),
 ) -> dict[str, Any]:
     """Says what is known without the data, as the document of `check.schema.json`."""
-    return _document(_native.check(job(pipeline, recording, set, plugins)))
+    return _document(job(pipeline, recording, set, plugins).call(_native.check))
 
 
 def plan(

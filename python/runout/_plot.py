@@ -32,6 +32,9 @@ def draw(tables: Mapping[str, Table], name: str, where: Mapping[str, str]) -> An
     if kind == "Map":
         _map(figure, axes, table, drawing, rows)
         return figure
+    if kind == "Vectors":
+        _vectors(figure, axes, table, drawing, rows)
+        return figure
     labelled = [_curves(axes, kind, table, drawing, of, curve) for curve, of in _parted(table, spec["curves"], rows)]
     if spec["level"]:
         axes.axhline(spec["level"]["value"], color="black", linestyle="--", label=spec["level"]["name"])
@@ -109,6 +112,20 @@ def _curves(axes: Any, kind: str, table: Table, drawing: dict[str, Any], rows: M
         axes.set_xlabel(_label(table, x))
         axes.set_ylabel("amplitude" if kind == "Amplitudes" else _label(table, values[0]))
     return bool(curve) or len(values) > 1
+
+
+def _vectors(figure: Any, axes: Any, table: Table, drawing: dict[str, Any], rows: Mask) -> None:
+    """Vectors seen along the third axis, which gives their colour, in the layer nearest to the middle of it."""
+    place, vector = ([np.asarray(table[column], dtype=float)[rows] for column in drawing[of]] for of in ("place", "vector"))
+    known = np.isfinite(place).all(axis=0) & np.isfinite(vector).all(axis=0)
+    (x, y, z), (dx, dy, dz) = ([of[known] for of in each] for each in (place, vector))
+    layer = z[np.argmin(np.abs(z - (z.min() + z.max()) / 2))]
+    here = np.isclose(z, layer)
+    arrows = axes.quiver(x[here], y[here], dx[here], dy[here], dz[here], angles="xy")
+    figure.colorbar(arrows, label=_label(table, drawing["vector"][2]))
+    axes.set_xlabel(_label(table, drawing["place"][0]))
+    axes.set_ylabel(f"{_label(table, drawing['place'][1])}, at {_label(table, drawing['place'][2])} = {layer:.4g}")
+    axes.set_aspect("equal")
 
 
 def _map(figure: Any, axes: Any, table: Table, drawing: dict[str, Any], rows: Mask) -> None:

@@ -26,6 +26,18 @@ class Error(Exception):
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (self.message, self.kind, self.help, self.causes)
 
+    def renamed(self, name: str, shown: str) -> Error:
+        """The same with another name for what it is about."""
+
+        def of(part: Any) -> Any:
+            if isinstance(part, tuple):
+                return tuple(map(of, part))
+            return part.replace(name, shown) if isinstance(part, str) else part
+
+        made, parts = self.__reduce__()
+        error: Error = made(*of(parts))
+        return error
+
 
 class DataError(Error):
     """The data cannot be read or used, or a file cannot be written."""

@@ -5,10 +5,11 @@ from __future__ import annotations
 import dataclasses
 import os
 import tempfile
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, Union
 
 from . import _toml
+from .errors import Error
 from .plugins import Own, checked, named
 from .recording import Points, Recording, Station
 from .tables import Diagnose, Evaluate, Limit, Rig, Surface
@@ -59,7 +60,21 @@ class Job:
     stations: list[Station] | None
     plugins: list[Own]
     held: Any = None
-    """A folder that lives as long as the call."""
+    """A folder that lives as long as the call, with points that are in memory."""
+
+    def call(self, work: Callable[..., Any], *rest: Any) -> Any:
+        """Calls the compiled part with this job. Its messages name points in memory by their class, not by a file."""
+        try:
+            return work(self, *rest)
+        except Error as error:
+            if self.held is None:
+                raise
+            raise error.renamed(_points_file(self.held), "runout.Points") from None
+
+
+def _points_file(held: Any) -> str:
+    return os.path.join(held.name, "points.csv")
+
 
 
 Source = Union[str, os.PathLike[str], Mapping[str, Any], Pipeline]
@@ -94,7 +109,7 @@ def job(
         stations = data.stations
     elif isinstance(data, Points):
         held = tempfile.TemporaryDirectory(prefix="runout-")
-        file = os.path.join(held.name, "points.csv")
+        file = _points_file(held)
         data.write(file)
         lines.append(f"load={{ plugin = \"points\", path = {_toml.string(file, 'load')} }}")
     if isinstance(plugins, (str, Mapping)) or not isinstance(plugins, Iterable):

@@ -186,6 +186,7 @@ def values(result: Result, symbol: str | None = None, **where: str) -> Any:
         "std": [one.std for one in found],
         "low_95": [low for low, _ in low_high],
         "high_95": [high for _, high in low_high],
+        "interval": [(one.facts.get("uncertainty") or {}).get("kind", "coverage") if one.interval_95 else None for one in found],
         "unit": [one.unit for one in found],
         "refuted_by": [one.facts.get("refuted_by") for one in found],
     }

@@ -237,6 +237,15 @@ def test_points_in_memory_are_those_of_a_file() -> None:
     assert runout.diagnose(built).verdict == runout.diagnose(keys | {"load": {"plugin": "points", "path": str(PROBE / "touches.csv")}}).verdict
 
 
+def test_messages_name_points_in_memory() -> None:
+    points = runout.Points.from_arrays(x_mm=[1.0, 2.0], y_mm=[1.0, 2.0])
+    keys = {"separate": {"plugin": "touch-probe", "ring_radius_mm": 25.0, "max_order": 15, "setups": SETUPS}, "load": {"plugin": "arrays"}}
+    with pytest.raises(runout.Error) as raised:
+        runout.run(keys, points)
+    said = " ".join([str(raised.value), *raised.value.causes])
+    assert "runout.Points" in said and "points.csv" not in said and "runout-" not in said
+
+
 def test_points_that_cannot_be_are_refused() -> None:
     with pytest.raises(ValueError, match="one length"):
         runout.Points.from_arrays(x_mm=[1.0, 2.0], y_mm=[1.0])

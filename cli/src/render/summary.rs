@@ -7,6 +7,7 @@ pub(super) mod values;
 
 use runout_core::{
     answer::Answer,
+    draws::IntervalKind,
     evaluate::Value,
     summary::{CaptureSummary, SectionSummary, StationSummary, Summary},
 };
@@ -199,7 +200,8 @@ fn with_uncertainty(value: &Value) -> String {
     }
     // As many decimals as the uncertainty has.
     let number = |number: f64| with_std(number, Some(known.std)).split(' ').next().unwrap_or_default().to_owned();
-    format!("{} (95 %: {} to {}){mark}", number(value.value), number(low), number(high))
+    let of = if known.kind == IntervalKind::Prediction { "predicted" } else { "95 %" };
+    format!("{} ({of}: {} to {}){mark}", number(value.value), number(low), number(high))
 }
 
 fn form_heading(stations: &[StationSummary]) -> String {

@@ -7,10 +7,12 @@ const WIDEST: usize = 100;
 /// Columns at least, of a terminal that is narrower.
 const NARROWEST: usize = 60;
 
-/// Columns for text on stdout: those of the terminal, within limits.
+/// Columns for text on stdout: those of the terminal, else those that the variable `COLUMNS` says, within limits.
 #[must_use]
 pub(crate) fn columns() -> usize {
-    terminal_size::terminal_size_of(std::io::stdout()).map_or(WIDEST, |(width, _)| within(usize::from(width.0)))
+    let terminal = || Some(usize::from(terminal_size::terminal_size_of(std::io::stdout())?.0.0));
+    let said = || std::env::var("COLUMNS").ok()?.parse().ok();
+    terminal().or_else(said).map_or(WIDEST, within)
 }
 
 /// Columns for text on a terminal of so many.

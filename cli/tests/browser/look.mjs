@@ -68,6 +68,18 @@ found.controls = await page.evaluate(async () => {
     const filter = [...box.querySelectorAll("label")].find((label) => label.textContent.startsWith("Filter"))?.querySelector("select");
     if (filter) said.filter = await changes(plot, () => { filter.value = "15"; filter.dispatchEvent(new Event("change")); });
     if (filter) { filter.value = "0"; filter.dispatchEvent(new Event("change")); }
+    await wait();
+    const choose = async (text, value) => {
+      const select = [...box.querySelectorAll("label")].find((label) => label.textContent.startsWith(text))?.querySelector("select");
+      if (!select) return undefined;
+      return changes(plot, () => { select.value = value; select.dispatchEvent(new Event("change")); });
+    };
+    const sheet = () => [...box.querySelectorAll(".sheet tr")].map((row) => [...row.children].map((cell) => cell.textContent));
+    said.sheet = sheet();
+    said.circle = await choose("Circle", "MZCI");
+    said.about = box.querySelector(".sheet caption")?.textContent;
+    said.zone = sheet();
+    said.plane = await choose("Plane", "2");
   }
   const slider = document.querySelector("#surface input[type=range]");
   if (slider) {
@@ -100,8 +112,19 @@ const { readFileSync } = await import("node:fs");
 const { frameTree } = await client.send("Page.getFrameTree");
 const { executionContextId } = await client.send("Page.createIsolatedWorld", { frameId: frameTree.frame.id, worldName: "audit" });
 const source = `${readFileSync(axe, "utf8")}; axe.run(document, { resultTypes: ["violations"] }).then((result) => JSON.stringify(result.violations.map((one) => ({ id: one.id, impact: one.impact, help: one.help, nodes: one.nodes.slice(0, 3).map((node) => node.html.slice(0, 160)) }))))`;
-const audited = await client.send("Runtime.evaluate", { expression: source, contextId: executionContextId, awaitPromise: true, returnByValue: true });
-found.axe = audited.exceptionDetails ? [{ id: "axe", impact: "serious", help: JSON.stringify(audited.exceptionDetails).slice(0, 400), nodes: [] }] : JSON.parse(audited.result.value);
+// By day, by night and on a phone.
+for (const [scheme, width] of [["light", 1440], ["dark", 1440], ["light", 390]]) {
+  await page.setViewport({ width, height: 900 });
+  await page.emulateMediaFeatures([{ name: "prefers-color-scheme", value: scheme }]);
+  await new Promise((done) => setTimeout(done, 500));
+  const audited = await client.send("Runtime.evaluate", { expression: source, contextId: executionContextId, awaitPromise: true, returnByValue: true });
+  const of = audited.exceptionDetails ? [{ id: "axe", impact: "serious", help: JSON.stringify(audited.exceptionDetails).slice(0, 400), nodes: [] }] : JSON.parse(audited.result.value);
+  found.axe.push(...of.map((one) => ({ ...one, where: `${scheme}, ${width} px` })));
+  const overflow = await page.evaluate(() => document.documentElement.scrollWidth - innerWidth);
+  if (overflow > 0) found.axe.push({ id: "overflow", impact: "serious", help: `the page is ${overflow} px wider than the window`, nodes: [], where: `${scheme}, ${width} px` });
+}
+await page.setViewport({ width: 1440, height: 900 });
+await page.emulateMediaFeatures([{ name: "prefers-color-scheme", value: "light" }]);
 
 if (pictures) {
   const shot = async (name, width, height, scheme) => {

@@ -84,6 +84,7 @@ fn corrected_results_are_recognisable() {
         diagnosis["outputs"].as_array().unwrap().iter().map(|path| path.as_str().unwrap()).collect();
     outputs.sort_unstable();
     let names = [
+        "circles.parquet",
         "consistency.parquet",
         "corrections.parquet",
         "diagnosis.json",

@@ -75,8 +75,16 @@ impl Folder {
 
     /// Runs the program here: no path of the machine can come into its words.
     pub(crate) fn run(&self, arguments: &[&str]) -> Ran {
-        let mut command = cargo_bin_cmd!("runout");
-        let output = command.current_dir(self.path()).env_remove("COLUMNS").args(arguments).output().unwrap();
+        self.run_by(cargo_bin_cmd!("runout").env_remove("COLUMNS"), arguments)
+    }
+
+    /// The same where lines have so many columns.
+    pub(crate) fn run_within(&self, columns: usize, arguments: &[&str]) -> Ran {
+        self.run_by(cargo_bin_cmd!("runout").env("COLUMNS", columns.to_string()), arguments)
+    }
+
+    fn run_by(&self, command: &mut assert_cmd::Command, arguments: &[&str]) -> Ran {
+        let output = command.current_dir(self.path()).args(arguments).output().unwrap();
         Ran {
             status: output.status.code().unwrap(),
             stdout: String::from_utf8(output.stdout).unwrap(),

@@ -29,3 +29,4 @@ mod straightness;
 mod text_recording;
 mod values;
 mod warnings;
+mod widths;

@@ -308,8 +308,38 @@ fn chromium_draws_what_the_tables_hold_and_the_controls_work() {
     {
         assert_eq!(controls[plot][control], true, "{plot} {control}");
     }
+    circles_are_those_of_the_table(&controls["plot-form"], &result);
     assert_eq!(controls["slider"], true);
     assert!(found["pointed"].as_str().unwrap().contains("deviation") && found["ring"].is_array(), "{found:#}");
+}
+
+/// The sheet below a polar plot has RONt of the circle that is chosen, section by section, as the table has it.
+fn circles_are_those_of_the_table(form: &serde_json::Value, result: &hdf5_metno::File) {
+    let ront = result.dataset("circles/ront_um").unwrap().read_raw::<f64>().unwrap();
+    let turned = result.dataset("circles/peak_deg").unwrap().read_raw::<f64>().unwrap();
+    // Four circles behind each filter of a section; LSCI and MZCI without filter come first.
+    let (stations, sections, circles) = (5, 2, 4);
+    let of_section = ront.len() / (stations * sections);
+    assert!(of_section.is_multiple_of(circles), "{of_section}");
+    let is_near = |cell: &serde_json::Value, expected: f64| {
+        let text = cell.as_str().unwrap().split(' ').next().unwrap();
+        (text.parse::<f64>().unwrap() - expected).abs() < 1e-3 * expected
+    };
+    for (rows, circle) in [("sheet", 0), ("zone", 1)] {
+        let rows = form[rows].as_array().unwrap();
+        assert_eq!(rows.len(), 1 + sections, "a row of names, and one a section");
+        for (section, row) in rows[1..].iter().enumerate() {
+            // The look has gone on to the second station.
+            let place = (sections + section) * of_section + circle;
+            assert!(is_near(&row[1], ront[place]), "{row} {}", ront[place]);
+            let angle = format!("at {:.1}°", turned[place]);
+            assert!(row[2].as_str().unwrap().ends_with(&angle), "{row} {angle}");
+        }
+    }
+    assert_eq!(
+        (form["circle"].as_bool(), form["about"].as_str()),
+        (Some(true), Some("About MZCI, filter: none; lengths in µm"))
+    );
 }
 
 #[test]

@@ -82,7 +82,7 @@ impl Interval {
         let interval_95 = [processed - least[2].max(most[2]), high].map(|end| end.max(floor));
         let std = (interval_95[1] - interval_95[0]) / (2.0 * NORMAL_95);
         let share_of_noise = found - processed + 0.5 * (least[1] + most[1]);
-        Self { found, uncertainty: Some(Uncertainty { std, interval_95, draws }), share_of_noise }
+        Self { found, uncertainty: Some(Uncertainty::new(std, interval_95, draws)), share_of_noise }
     }
 
     /// By how much noise has raised it, where that is more than its standard uncertainty.

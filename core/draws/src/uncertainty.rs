@@ -26,9 +26,41 @@ pub struct Uncertainty {
     pub interval_95: [f64; 2],
     /// Draws of the Monte Carlo; 0 where none was needed.
     pub draws: usize,
+    /// What the interval contains.
+    #[serde(default)]
+    pub kind: IntervalKind,
+}
+
+/// What an interval contains with its probability.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum IntervalKind {
+    /// The true value: a coverage interval (VIM 2.36).
+    #[default]
+    Coverage,
+    /// The value of another capture of the same: a prediction interval. It is wider than twice the standard uncertainty where that scatter is
+    /// known from few captures.
+    Prediction,
+}
+
+impl IntervalKind {
+    /// Its name in tables.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Coverage => "coverage",
+            Self::Prediction => "prediction",
+        }
+    }
 }
 
 impl Uncertainty {
+    /// With an interval that contains the true value.
+    #[must_use]
+    pub fn new(std: f64, interval_95: [f64; 2], draws: usize) -> Self {
+        Self { std, interval_95, draws, kind: IntervalKind::Coverage }
+    }
+
     /// Of an amplitude, from the standard uncertainty of its part along the phasor, known from so many real degrees of
     /// freedom (0 where it is taken as exact). An amplitude that noise alone exceeds in more than [5 % of all
     /// cases](noise_95) may be noise: its interval begins at 0.
@@ -36,7 +68,7 @@ impl Uncertainty {
     pub fn of_amplitude(value: f64, std: f64, freedom: usize) -> Self {
         let reach = student_95(freedom as f64) * std;
         let low = if value < noise_95(freedom as f64) * std { 0.0 } else { (value - reach).max(0.0) };
-        Self { std, interval_95: [low, value + reach], draws: 0 }
+        Self::new(std, [low, value + reach], 0)
     }
 
     /// The same with an interval so many times as wide about its middle.

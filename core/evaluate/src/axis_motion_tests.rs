@@ -157,7 +157,7 @@ fn every_value_has_a_known_symbol_and_unit() {
 
 fn limited(found: &Evaluated, limit: &str, text: &str) -> (Decision, Option<String>) {
     let limit = toml::from_str::<Limit>(limit).unwrap().check(&settings(text), &[], None).unwrap();
-    let (decided, remarks) = decide(&[limit], &found.placed().collect::<Vec<_>>());
+    let (decided, remarks) = decide(&[limit], &found.placed().collect::<Vec<_>>()).unwrap();
     assert!(remarks.is_empty(), "{remarks:?}");
     (decided[0].decision, decided[0].values[0].missing.clone())
 }

@@ -59,11 +59,8 @@ fn near_noise(known: Uncertainty, value_um: f64, noise_um: f64, std_um: f64) -> 
     if is_clear(value_um, noise_um) {
         return known;
     }
-    Uncertainty {
-        std: known.std.max(std_um),
-        interval_95: [(value_um - noise_um).max(0.0), value_um + noise_um],
-        draws: known.draws,
-    }
+    let interval_95 = [(value_um - noise_um).max(0.0), value_um + noise_um];
+    Uncertainty::new(known.std.max(std_um), interval_95, known.draws)
 }
 
 #[cfg(test)]
@@ -97,11 +94,8 @@ mod tests {
             };
             let of_one = Uncertainty::of_amplitude(distance(1), stds[0], 0).interval_95;
             let value = 2.0 * [1, 2, 3].map(distance).into_iter().fold(0.0, f64::max);
-            let drawn = Uncertainty {
-                std: 2.0 * largest,
-                interval_95: [value - 2.0 * 1.96 * stds[0], value + 2.0 * 1.96 * stds[0]],
-                draws: 400,
-            };
+            let reach = 2.0 * 1.96 * stds[0];
+            let drawn = Uncertainty::new(2.0 * largest, [value - reach, value + reach], 400);
             let of_all = of_diameter(drawn, value, largest, 3).interval_95;
             for (inside, (truth, [low, high])) in
                 inside.iter_mut().zip([(beside_um, of_one), (2.0 * beside_um, of_all)])

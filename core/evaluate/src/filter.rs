@@ -56,6 +56,12 @@ impl Filter {
         low * high.map_or(Complex64::ONE, |cutoff| self.kind.high_pass(upr, cutoff))
     }
 
+    /// Cut-off of a Gaussian low-pass, 0 where everything passes; `None` of any other filter.
+    pub(crate) fn gaussian_upr(&self) -> Option<f64> {
+        let low_pass = self.band.above_upr.is_none() && (self.kind == Kind::Gaussian || self.passes_everything());
+        low_pass.then_some(self.band.below_upr.unwrap_or(0.0))
+    }
+
     /// Share of an order that its low-pass passes.
     fn passes(&self, order: f64, cutoff: f64) -> f64 {
         self.kind.low_pass(order, cutoff).norm()

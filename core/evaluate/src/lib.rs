@@ -4,6 +4,7 @@
 mod areal;
 mod axis_motion;
 mod centres;
+mod circles;
 mod config;
 mod cylindricity;
 pub mod error_motion;
@@ -30,6 +31,7 @@ mod value;
 mod wall;
 
 pub use areal::add_areal;
+pub use circles::ReferenceCircle;
 pub use config::{ArealFilter, Evaluate, EvaluateConfig, FormRemoval, Group};
 pub use evaluables::Evaluated;
 pub use generatrix::add_generatrices;

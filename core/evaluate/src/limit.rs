@@ -1,6 +1,7 @@
 //! `[[limit]]`: what values have to keep, and what was found of them.
 
 use crate::value::{PlacedValue, Value};
+use runout_error::{Error, Result, fault::known_names};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -184,9 +185,35 @@ fn missing(value: &Value) -> Option<String> {
     Some(format!("of its band, a low-pass has weakened what is above {above:.1} undulations"))
 }
 
+/// Refuses a limit of a section that none of its values is of, where these are a domain's own or of no station: only a run knows what they
+/// are of.
+fn check_section(limit: &Limit, all: &[PlacedValue]) -> Result<()> {
+    let Some(asked) = &limit.section else { return Ok(()) };
+    let of_symbol = || all.iter().filter(|placed| placed.value.symbol == limit.symbol);
+    let mut sections: Vec<&str> = of_symbol().filter_map(|placed| placed.section).collect();
+    if of_symbol().any(|placed| placed.station.is_some())
+        || of_symbol().count() == 0
+        || sections.contains(&asked.as_str())
+    {
+        return Ok(());
+    }
+    sections.sort_unstable();
+    sections.dedup();
+    let what = format!("no value {} is of `{asked}`", limit.symbol);
+    let error = Error::new("decide", format!("the limit {}", limit.name()), what);
+    Err(error.help(if sections.is_empty() {
+        format!("the result has one {}: leave `section` out", limit.symbol)
+    } else {
+        known_names(asked, sections)
+    }))
+}
+
 /// Holds all values against all limits. Besides, what the user should know: limits that name no value.
-#[must_use]
-pub fn decide(limits: &[Limit], all: &[PlacedValue]) -> (Vec<LimitSummary>, Vec<String>) {
+///
+/// # Errors
+/// When a limit names a section that a domain's own values are not of.
+pub fn decide(limits: &[Limit], all: &[PlacedValue]) -> Result<(Vec<LimitSummary>, Vec<String>)> {
+    limits.iter().try_for_each(|limit| check_section(limit, all))?;
     let mut remarks = Vec::new();
     let decide = |limit: &Limit| {
         let named = all.iter().filter(|PlacedValue { section, value, .. }| {
@@ -208,5 +235,37 @@ pub fn decide(limits: &[Limit], all: &[PlacedValue]) -> (Vec<LimitSummary>, Vec<
         LimitSummary { limit: limit.clone(), decision, values }
     };
     let decided = limits.iter().map(decide).collect();
-    (decided, remarks)
+    Ok((decided, remarks))
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "tests")]
+
+    use super::*;
+    use crate::NamedValue;
+
+    /// A limit of a domain's own values names what they are of.
+    #[test]
+    fn a_section_that_no_own_value_is_of_is_refused() {
+        let values = ["X", "Y"].map(|axis| NamedValue::new("A", 1.0, 0.1, "um", "bi-directional accuracy").of(axis));
+        let whole = NamedValue::new("E", 1.0, 0.1, "um", "of the machine");
+        let own: Vec<_> =
+            values.iter().chain([&whole]).map(|value| (value.of.as_deref(), value.own().unwrap())).collect();
+        let placed: Vec<_> = own.iter().map(PlacedValue::own).collect();
+        let limit = |text: &str| toml::from_str::<Limit>(&format!("{text}\nupper = 2.0\nunit = 'um'")).unwrap();
+        let decided = |text: &str| decide(&[limit(text)], &placed);
+        assert_eq!(decided("symbol = 'A'\nsection = 'X'").unwrap().0[0].values.len(), 1);
+        assert_eq!(decided("symbol = 'A'").unwrap().0[0].values.len(), 2);
+        let refused = |text: &str| {
+            let error = decided(text).unwrap_err();
+            format!("{error}; {}", error.advice().unwrap_or_default())
+        };
+        let said = refused("symbol = 'A'\nsection = 'Z'");
+        assert!(said.contains("`Z`") && said.contains('X') && said.contains('Y'), "{said}");
+        let said = refused("symbol = 'E'\nsection = 'X'");
+        assert!(said.contains("leave `section` out"), "{said}");
+        // Without any value of the symbol there is a remark instead.
+        assert_eq!(decided("symbol = 'B'\nsection = 'X'").unwrap().1.len(), 1);
+    }
 }

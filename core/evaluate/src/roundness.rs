@@ -39,8 +39,23 @@ impl Form {
 
     /// Values about reference circles, of the profile between the angles too.
     fn about(&self, filter: &Filter, references: &[Reference]) -> Vec<f64> {
+        self.with_series(filter, |series| {
+            let mut found = Vec::new();
+            for reference in references {
+                if *reference == Reference::LeastSquares {
+                    let about = series.about(*reference).ok().map(|found| found.1);
+                    add_values(about, *reference, &mut found);
+                } else {
+                    found.push(series.ront_um(*reference).unwrap_or(f64::NAN));
+                }
+            }
+            found
+        })
+    }
+
+    /// What is found of the profile behind a filter, on the given angles and others between them, so that no crest is far from one.
+    pub(super) fn with_series<T>(&self, filter: &Filter, find: impl FnOnce(&mut Series) -> T) -> T {
         let waves = filter.highest(self.held.highest);
-        // The given angles and others between them, so that no crest is far from one.
         let angles = self.angles * (FOUND_POINTS_A_WAVE * waves).div_ceil(self.angles).max(1);
         let harmonics = filter.harmonics(&self.harmonics);
         let mut fourier = Fourier::new(angles);
@@ -48,17 +63,7 @@ impl Form {
         if !self.at.gaps.is_empty() {
             self.at.gaps.blank(profile_um.to_mut());
         }
-        let mut series = Series::new(&harmonics, &profile_um, self.radius_mm);
-        let mut found = Vec::new();
-        for reference in references {
-            if *reference == Reference::LeastSquares {
-                let about = series.about(*reference).ok().map(|found| found.1);
-                add_values(about, *reference, &mut found);
-            } else {
-                found.push(series.ront_um(*reference).unwrap_or(f64::NAN));
-            }
-        }
-        found
+        find(&mut Series::new(&harmonics, &profile_um, self.radius_mm))
     }
 
     /// What is known of the same values by draws on fewer angles; nothing without known errors.

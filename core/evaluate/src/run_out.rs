@@ -25,16 +25,15 @@ pub(crate) fn values(profiles: &[Profile], readings: &[ReadingValues], rig: &Rig
             let label = Label::new("TIR", "µm", TIR, format!("reading of {} in {}", reading.sensor, setup.id));
             values.push(value(label, [1, profile.max_order()], reading.tir_um, reading.tir_uncertainty.clone()));
         }
-        if rig.is_face(section) {
-            continue;
-        }
-        let channels: Vec<(usize, usize)> =
-            profile.sensors.iter().copied().enumerate().filter(|(_, sensor)| is_here(sensor)).collect();
-        values.extend(
-            Eccentricity::of(profile, &channels, rig).map(|found| found.values(&setup.id)).into_iter().flatten(),
-        );
+        let centre = Eccentricity::of(profile, rig, section);
+        values.extend(centre.map(|found| found.values(&setup.id)).into_iter().flatten());
     }
     values
+}
+
+/// C of a section in the first setup that gives it, in µm; nothing of a face, or without order 1.
+pub(crate) fn first_centre_um(profiles: &[Profile], rig: &Rig, section: usize) -> Option<Complex64> {
+    profiles.iter().find_map(|profile| Eccentricity::of(profile, rig, section)).map(|found| found.centre)
 }
 
 fn value(label: Label, band_upr: [usize; 2], value: f64, uncertainty: Option<Uncertainty>) -> Value {
@@ -68,8 +67,14 @@ struct Eccentricity {
 }
 
 impl Eccentricity {
-    /// From these channels, each with its sensor; nothing where there is none, or the average holds no order 1.
-    fn of(profile: &Profile, channels: &[(usize, usize)], rig: &Rig) -> Option<Self> {
+    /// From the section's channels; nothing of a face, where there is none, or where the average holds no order 1.
+    fn of(profile: &Profile, rig: &Rig, section: usize) -> Option<Self> {
+        if rig.is_face(section) {
+            return None;
+        }
+        let is_here = |sensor: usize| rig.sensors.get(sensor).is_some_and(|sensor| sensor.section == section);
+        let channels: Vec<(usize, usize)> =
+            profile.sensors.iter().copied().enumerate().filter(|(_, sensor)| is_here(*sensor)).collect();
         let (width, count) = (profile.sensors.len(), channels.len());
         let setup = rig.setups.get(profile.setup)?;
         let direction = rig.rotation.direction();
@@ -110,7 +115,7 @@ impl Eccentricity {
         let of_angle = clear.map(|std| {
             let std = (std / size_um).to_degrees();
             let reach = student_95(self.freedom as f64) * std;
-            Uncertainty { std, interval_95: [angle_deg - reach, angle_deg + reach], draws: 0 }
+            Uncertainty::new(std, [angle_deg - reach, angle_deg + reach], 0)
         });
         let reference = format!("axis of rotation in {setup}");
         let label = |symbol, unit, source: &str| Label::new(symbol, unit, source, reference.clone());

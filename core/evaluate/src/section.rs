@@ -107,7 +107,7 @@ pub(super) struct Form {
 const NEGLIGIBLE: f64 = 1e-3;
 
 impl Form {
-    fn of(result: &StationResult, section: usize, radius_mm: f64) -> Option<Self> {
+    pub(super) fn of(result: &StationResult, section: usize, radius_mm: f64) -> Option<Self> {
         let separation = &result.separation;
         let unknown = separation.position(Quantity::Form(section))?;
         let from_two = |harmonics: Vec<Complex64>| {
@@ -245,7 +245,7 @@ impl Form {
             let of_phase = std.filter(|std| amplitude >= noise_95(freedom as f64) * std).map(|std| {
                 let std = (std / (amplitude * turns)).to_degrees();
                 let reach = student_95(freedom as f64) * std;
-                Uncertainty { std, interval_95: [phase - reach, phase + reach], draws: 0 }
+                Uncertainty::new(std, [phase - reach, phase + reach], 0)
             });
             let labels = vec![
                 Label::new("amplitude", "µm", "amplitude of one order of the form", "LSCI"),

@@ -1,7 +1,7 @@
 //! One station with all of its values, finished in one place.
 
 use crate::{
-    Evaluate, Group, Value,
+    Evaluate, Group, ReferenceCircle, Value, circles,
     error_motion::{Centre, ErrorMotion, behind_low_pass, with_jitter_of_marks},
     run_out,
     section::{missing_circles, section_values, steepest_um_per_deg},
@@ -16,6 +16,8 @@ pub struct EvaluatedStation {
     pub result: StationResult,
     /// Values of the form, section by section.
     pub values: Vec<Vec<Value>>,
+    /// Reference circles of the form, section by section.
+    pub circles: Vec<Vec<ReferenceCircle>>,
     /// Error motion values of the axis; empty where no spread over the turns is known.
     pub motion_values: Vec<Value>,
     /// What readings have by themselves: where nothing is separated, or run-out is asked for.
@@ -51,6 +53,10 @@ impl EvaluatedStation {
             let all = values.iter_mut().flatten().chain(&mut motion_values);
             all.for_each(|value| value.refuted_by = Some(by.clone()));
         }
+        let circle = |(section, values): (usize, &Vec<Value>)| {
+            circles::section_circles(&result, section, evaluate, radius_mm, rig, values)
+        };
+        let circles = values.iter().enumerate().map(circle).collect();
         let asked = evaluate.has(Group::RunOut) || result.separation.has_no_observable_form();
         let readings = if asked { ReadingValues::of_all(&result.profiles, rig) } else { Vec::new() };
         if let Some(rig) = rig.filter(|_| evaluate.has(Group::RunOut)) {
@@ -62,7 +68,7 @@ impl EvaluatedStation {
                 );
             }
         }
-        Self { result, values, motion_values, readings }
+        Self { result, values, circles, motion_values, readings }
     }
 
     /// The first RONt of a section.

@@ -673,8 +673,7 @@ fn intervals_of_lines_hold_from_zero_on() {
 
 #[allow(clippy::type_complexity, reason = "taken apart at once by the test")]
 fn limited(limits: &str) -> Vec<(Decision, Vec<(Decision, bool)>, usize)> {
-    let uncertainty =
-        |std: f64, value: f64| Uncertainty { std, interval_95: [value - 2.0 * std, value + 2.0 * std], draws: 400 };
+    let uncertainty = |std: f64, value: f64| Uncertainty::new(std, [value - 2.0 * std, value + 2.0 * std], 400);
     let value = |reference: &str, value: f64, std: Option<f64>| Value {
         symbol: "RONt".into(),
         unit: "um".into(),
@@ -700,7 +699,7 @@ fn limited(limits: &str) -> Vec<(Decision, Vec<(Decision, bool)>, usize)> {
     let mut evaluate = Evaluate::default();
     let limit: Limit = toml::from_str(limits).unwrap();
     evaluate.add_limit(limit.check(&evaluate, &[], None).unwrap());
-    let (decided, remarks) = decide(evaluate.limits(), &placed);
+    let (decided, remarks) = decide(evaluate.limits(), &placed).unwrap();
     let of = |value: &LimitValue| (value.decision, value.within);
     decided.iter().map(|one| (one.decision, one.values.iter().map(of).collect(), remarks.len())).collect()
 }
@@ -735,7 +734,7 @@ fn nothing_is_proven_of_a_value_that_lacks_orders() {
         result.profiles = half_power_hz.into_iter().map(weakened).collect();
         let values = section_values(&result, 0, &evaluate, RADIUS_MM);
         let placed = values.iter().map(|value| PlacedValue { station: None, section: None, z_mm: None, value });
-        let (found, _) = decide(std::slice::from_ref(&limit), &placed.collect::<Vec<_>>());
+        let (found, _) = decide(std::slice::from_ref(&limit), &placed.collect::<Vec<_>>()).unwrap();
         found[0].values.iter().map(|value| (value.filter.clone(), value.decision)).collect::<Vec<_>>()
     };
     let of = |none, filtered| vec![("none".to_owned(), none), ("Gaussian 50 UPR".to_owned(), filtered)];
@@ -772,7 +771,7 @@ fn nothing_is_proven_of_a_filter_that_reaches_above_the_orders() {
         let limit: Limit = toml::from_str(limit).unwrap();
         let values = section_values(&station(0.0, waves, highest, 1e-8, &[]), 0, &evaluate(text).unwrap(), RADIUS_MM);
         let placed = values.iter().map(|value| PlacedValue { station: None, section: None, z_mm: None, value });
-        let (found, _) = decide(std::slice::from_ref(&limit), &placed.collect::<Vec<_>>());
+        let (found, _) = decide(std::slice::from_ref(&limit), &placed.collect::<Vec<_>>()).unwrap();
         let one = found[0].values.first().unwrap().clone();
         (one.decision, one.band_upr, one.missing)
     };

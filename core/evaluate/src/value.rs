@@ -213,7 +213,7 @@ impl NamedValue {
     pub fn own(&self) -> Option<Value> {
         let value = self.value.filter(|_| self.reference.is_none())?;
         let normal = |std: f64| [value - NORMAL_95 * std, value + NORMAL_95 * std];
-        let known = |std: f64| Uncertainty { std, interval_95: self.interval_95.unwrap_or(normal(std)), draws: 0 };
+        let known = |std: f64| Uncertainty::new(std, self.interval_95.unwrap_or(normal(std)), 0);
         Some(Value {
             symbol: self.symbol.clone(),
             unit: self.unit.clone(),

@@ -233,7 +233,7 @@ impl Moments {
         let floor = if lowest >= 0.0 { 0.0 } else { f64::NEG_INFINITY };
         let quantile = if draws > 0 { student_95((draws / 2 - 1) as f64) } else { NORMAL_95 };
         let interval_95 = [-quantile, quantile].map(|end| (value - shift + end * std).max(floor));
-        Ok(Uncertainty { std, interval_95, draws })
+        Ok(Uncertainty::new(std, interval_95, draws))
     }
 }
 

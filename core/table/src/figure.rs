@@ -19,6 +19,10 @@ pub struct Figure {
     pub places: Option<String>,
     /// A limit that all panels show.
     pub level: Option<Level>,
+    /// Name of a table of [reference circles](crate::circles) about which the curves of a polar figure can be looked at; its rows have the
+    /// same columns of names.
+    #[serde(default)]
+    pub circles: Option<String>,
     /// How its rows are drawn.
     pub drawing: Drawing,
 }
@@ -81,6 +85,13 @@ pub enum Drawing {
         /// The height.
         value: String,
     },
+    /// Vectors at places in space, drawn longer than they are.
+    Vectors {
+        /// The three coordinates of a place, all of one unit.
+        place: [String; 3],
+        /// The three components of its vector along the same axes, all of one unit.
+        vector: [String; 3],
+    },
 }
 
 /// A column of values, and that of their standard uncertainty where there is one.
@@ -140,7 +151,7 @@ impl Figure {
     fn new(id: impl Into<String>, title: impl Into<String>, drawing: Drawing) -> Self {
         let (panels, curves) = (Vec::new(), Vec::new());
         let (id, title) = (id.into(), title.into());
-        Self { id, title, panels, curves, only: None, places: None, level: None, drawing }
+        Self { id, title, panels, curves, only: None, places: None, level: None, circles: None, drawing }
     }
 
     /// Deviations about a reference circle.
@@ -207,6 +218,12 @@ impl Figure {
         Self::new(id, title, Drawing::Map { x: x.into(), y: y.into(), value: value.into() })
     }
 
+    /// Vectors at places in space.
+    #[must_use]
+    pub fn vectors(id: impl Into<String>, title: impl Into<String>, place: [String; 3], vector: [String; 3]) -> Self {
+        Self::new(id, title, Drawing::Vectors { place, vector })
+    }
+
     /// The same with a panel for each combination of names in these columns.
     #[must_use]
     pub fn panels<T: Into<String>>(self, columns: impl IntoIterator<Item = T>) -> Self {
@@ -237,6 +254,12 @@ impl Figure {
         Self { level: Some(Level { name: name.into(), value }), ..self }
     }
 
+    /// The same with the reference circles in a table.
+    #[must_use]
+    pub fn circles(self, table: impl Into<String>) -> Self {
+        Self { circles: Some(table.into()), ..self }
+    }
+
     /// The columns of its table that it needs.
     #[must_use]
     pub fn columns(&self) -> Vec<&str> {
@@ -255,6 +278,7 @@ impl Figure {
                 columns.extend([order.as_str(), parts[0].as_str(), parts[1].as_str()]);
                 columns.extend(std.as_deref());
             }
+            Drawing::Vectors { place, vector } => columns.extend(place.iter().chain(vector).map(String::as_str)),
             Drawing::Map { x, y, value } => columns.extend([x.as_str(), y.as_str(), value.as_str()]),
         }
         columns

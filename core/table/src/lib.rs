@@ -16,6 +16,7 @@
 //! assert!(table.rows(vec![numbers([0.0])]).is_err(), "a column is missing");
 //! ```
 
+pub mod circles;
 pub mod figure;
 pub mod number;
 pub mod panels;

@@ -1,7 +1,10 @@
 //! Rows of a table as the panels and curves of a figure, for whatever draws them.
 
+mod arrows;
+mod circles;
 mod columns;
 mod grid;
+mod source;
 #[cfg(test)]
 mod tests;
 
@@ -12,10 +15,13 @@ use runout_error::{Error, Result};
 
 use crate::{
     TableSpec,
-    figure::{Drawing, Figure, Level, Measure},
+    figure::{Figure, Level},
 };
+pub use arrows::Arrow;
+pub use circles::Circle;
 use columns::{Names, Numbers, joined};
 pub use grid::{Cells, Grid};
+use source::{Drawn, Source, drawn};
 
 /// The rows of one figure, collected while they come.
 pub struct Panels {
@@ -35,6 +41,10 @@ pub struct Panels {
     pub places: Vec<(f64, String)>,
     /// A horizontal line across every panel, in the unit of the vertical axis before it is [scaled](Self::scaled).
     pub level: Option<Level>,
+    /// The three components of vectors; empty where none are drawn.
+    pub vector: Vec<Axis>,
+    /// Name of the table of reference circles.
+    circles: Option<String>,
     place_column: Option<String>,
     known_places: HashSet<u64>,
     /// Panels that there were.
@@ -64,6 +74,8 @@ pub enum Kind {
     Bars,
     /// Heights over a rectangle.
     Map,
+    /// Vectors at places in space.
+    Vectors,
 }
 
 /// What an axis shows.
@@ -97,6 +109,10 @@ pub struct Curve {
     pub marks: Vec<Mark>,
     /// Whether it is a line where others are points.
     pub joined: bool,
+    /// Reference circles about which it can be looked at.
+    pub circles: Vec<Circle>,
+    /// Of vectors, each with its place; then [`points`](Self::points) are the places.
+    pub arrows: Vec<Arrow>,
 }
 
 /// A point of a curve with what there is to say of it.
@@ -121,17 +137,6 @@ pub struct Point {
     pub third: f64,
 }
 
-/// Where the numbers of a curve are: x, y, and the third number.
-struct Source {
-    /// Name of the curve among those of its rows; empty where there is one only.
-    name: String,
-    x: String,
-    y: [Option<String>; 2],
-    third: Option<String>,
-    marks: Option<String>,
-    common: bool,
-}
-
 impl Panels {
     /// None yet; of more than `most` panels, those at equal distances are kept.
     ///
@@ -153,47 +158,7 @@ impl Panels {
             let unit = table.column(column).and_then(|column| column.unit.split(';').next()).unwrap_or_default();
             Axis { name: without_unit(column, unit), unit: unit.to_owned() }
         };
-        let values_axis = |values: &[Measure]| match values {
-            [one] => {
-                let named = axis(&one.column);
-                Axis { name: one.symbol.clone().unwrap_or(named.name), ..named }
-            }
-            several => {
-                Axis { name: String::new(), ..several.first().map_or_else(|| axis(""), |one| axis(&one.column)) }
-            }
-        };
-        let (kind, axes, values) = match &figure.drawing {
-            Drawing::Polar { angle_deg: x, values } => {
-                (Kind::Polar, [axis(x), values_axis(values)], curves(x, values, &axis))
-            }
-            Drawing::Lines { x, values } => (Kind::Lines, [axis(x), values_axis(values)], curves(x, values, &axis)),
-            Drawing::Points { x, values } => (Kind::Points, [axis(x), values_axis(values)], curves(x, values, &axis)),
-            Drawing::Bars { order: x, values } => {
-                (Kind::Bars, [axis(x), values_axis(values)], curves(x, values, &axis))
-            }
-            Drawing::Amplitudes { order, parts: [real, imaginary], std } => {
-                let y = [Some(real.clone()), Some(imaginary.clone())];
-                let source =
-                    Source { name: String::new(), x: order.clone(), y, third: std.clone(), marks: None, common: false };
-                let amplitude = Axis { name: "amplitude".into(), ..axis(real) };
-                (Kind::Amplitudes, [axis(order), amplitude], vec![source])
-            }
-            Drawing::Map { x, y, value } => {
-                let source = Source {
-                    name: value.clone(),
-                    x: x.clone(),
-                    y: [Some(y.clone()), None],
-                    third: Some(value.clone()),
-                    marks: None,
-                    common: false,
-                };
-                (Kind::Map, [axis(x), axis(y)], vec![source])
-            }
-        };
-        let height = match &figure.drawing {
-            Drawing::Map { value, .. } => axis(value),
-            _ => axis(""),
-        };
+        let Drawn { kind, axes, height, vector, values } = drawn(&figure.drawing, &axis);
         Ok(Self {
             height,
             id: figure.id.clone(),
@@ -204,6 +169,8 @@ impl Panels {
             drawn: Vec::new(),
             places: Vec::new(),
             level: figure.level.clone(),
+            circles: figure.circles.clone(),
+            vector,
             place_column: figure.places.clone(),
             known_places: HashSet::new(),
             numbers: HashMap::new(),
@@ -222,7 +189,7 @@ impl Panels {
         self.numbers.len()
     }
 
-    /// Axis of the heights of a map.
+    /// Axis of the heights of a map, and of the third coordinate of vectors.
     #[must_use]
     pub fn height(&self) -> &Axis {
         &self.height
@@ -242,8 +209,21 @@ impl Panels {
         }
     }
 
+    /// Takes rows of a table where they are of the figure's own one, or of that of its reference circles, which come later.
+    pub fn take(&mut self, table: &str, rows: &RecordBatch) {
+        if self.table == table {
+            self.add(rows);
+        } else if self.circles.as_deref() == Some(table) {
+            self.add_circles(rows);
+        }
+    }
+
     /// Takes rows of the table.
     pub fn add(&mut self, rows: &RecordBatch) {
+        if self.kind == Kind::Vectors {
+            self.add_arrows(rows);
+            return;
+        }
         let names = |columns: &[String]| columns.iter().map(|column| Names::of(rows, column)).collect::<Vec<_>>();
         let (panel_names, curve_names) = (names(&self.panel_columns), names(&self.curve_columns));
         let only = self.only.as_ref().map(|(column, names)| (Names::of(rows, column), names.clone()));
@@ -355,32 +335,17 @@ impl Curve {
             }
         }
         let marks = self.marks.iter().map(|mark| Mark { y: scale * mark.y, ..mark.clone() }).collect();
-        let (name, missing) = (self.name.clone(), self.missing.clone());
-        Self { name, points: points.into_iter().map(scaled).collect(), missing, marks, joined: self.joined }
+        let circles = self.circles.iter().map(|circle| circle.scaled(scale)).collect();
+        Self {
+            name: self.name.clone(),
+            points: points.into_iter().map(scaled).collect(),
+            missing: self.missing.clone(),
+            marks,
+            joined: self.joined,
+            circles,
+            arrows: self.arrows.clone(),
+        }
     }
-}
-
-impl Source {
-    fn columns<'a>(&self, rows: &'a RecordBatch) -> [Option<Numbers<'a>>; 4] {
-        let column = |name: Option<&String>| name.and_then(|name| Numbers::of(rows, name));
-        [column(Some(&self.x)), column(self.y[0].as_ref()), column(self.y[1].as_ref()), column(self.third.as_ref())]
-    }
-}
-
-fn curves(x: &str, values: &[Measure], axis: &dyn Fn(&str) -> Axis) -> Vec<Source> {
-    let source = |value: &Measure| Source {
-        name: match &value.symbol {
-            Some(symbol) => symbol.clone(),
-            None if values.iter().filter(|value| !value.common).count() > 1 || value.common => axis(&value.column).name,
-            None => String::new(),
-        },
-        x: x.to_owned(),
-        y: [Some(value.column.clone()), None],
-        third: value.std.clone(),
-        marks: value.marks.clone(),
-        common: value.common,
-    };
-    values.iter().map(source).collect()
 }
 
 /// `tilt_x_urad` as `tilt x`.

@@ -1,5 +1,7 @@
 //! Drawing panels, by one plotting library.
 
+mod vectors;
+
 use kuva::{
     backend::{png::PngBackend, svg::SvgBackend},
     plot::{
@@ -88,6 +90,7 @@ fn size(kind: Kind) -> [f64; 2] {
         Kind::Polar => [560.0, 660.0],
         Kind::Lines | Kind::Points | Kind::Amplitudes | Kind::Bars => [720.0, 420.0],
         Kind::Map => [860.0, 460.0],
+        Kind::Vectors => [720.0, 560.0],
     }
 }
 
@@ -108,6 +111,7 @@ fn cell(figure: &Panels, panel: &Panel, scale: f64, unit: &str) -> (Vec<Plot>, L
         // Eccentricity is no form, and high orders are noise.
         Kind::Amplitudes => bars(&curves, &axes, 2.0, level),
         Kind::Bars => bars(&curves, &axes, 0.0, level),
+        Kind::Vectors => vectors::draw(panel, &axes, figure),
         Kind::Map => {
             let points = panel.curves.iter().flat_map(|curve| curve.points.iter().copied()).collect::<Vec<_>>();
             map(&points, &axes, figure.height())

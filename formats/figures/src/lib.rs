@@ -169,7 +169,7 @@ struct Drawing {
 
 impl Export for Drawing {
     fn rows(&mut self, table: &TableSpec, rows: &RecordBatch) -> Result<()> {
-        self.figures.iter_mut().filter(|figure| figure.table == table.name).for_each(|figure| figure.add(rows));
+        self.figures.iter_mut().for_each(|figure| figure.take(&table.name, rows));
         Ok(())
     }
 

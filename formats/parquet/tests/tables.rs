@@ -250,7 +250,7 @@ fn values_are_rows_and_null_where_there_is_none() {
     let context = Context { folder: Path::new(""), rig: None };
     let exporter = ParquetConfig { path: folder.path().to_path_buf() }.check(&context).unwrap();
     let export = exporter.begin(&StationTables::new(None, None).info("")).unwrap();
-    let interval = Uncertainty { std: 0.1, interval_95: [3.7, 4.1], draws: 400 };
+    let interval = Uncertainty::new(0.1, [3.7, 4.1], 400);
     let value = |symbol: &str, value, uncertainty| Value {
         symbol: symbol.into(),
         unit: "um".into(),

@@ -3,7 +3,6 @@
 
 const Draw = (() => {
   const COVERAGE = 2; // Standard uncertainties on each side of an interval of 95 %.
-  const MM_PER_PX = 25.4 / 96; // As CSS defines them.
 
   function numbers(data) {
     if (data === undefined) return null;
@@ -101,81 +100,6 @@ const Draw = (() => {
       }
     }
     return Array.from(filtered);
-  }
-
-  function polar(figure, panel, cutoff) {
-    const { line, faint, curves: palette } = colours();
-    const traces = [];
-    const curves = panel.curves.map((curve) => {
-      const theta = numbers(curve.x);
-      const whole = closed(theta);
-      const filtered = cutoff > 0 && whole;
-      const values = filtered ? gaussian(theta, numbers(curve.y), cutoff) : numbers(curve.y);
-      // What a filter leaves of an uncertainty is not known here.
-      const std = filtered ? null : numbers(curve.std);
-      return { name: curve.name, theta, values, std, whole };
-    });
-    let largest = 0;
-    for (const { values, std } of curves) {
-      values.forEach((value, place) => { largest = Math.max(largest, Math.abs(value) + COVERAGE * (std?.[place] || 0)); });
-    }
-    const span = roundedUp(largest);
-    const around = Array.from({ length: 181 }, (_, step) => 2 * step);
-    traces.push({
-      type: "scatterpolar", mode: "lines", name: "reference circle", theta: around, r: around.map(() => 0), hoverinfo: "skip",
-      line: { color: faint, width: 1.2, dash: "dash" }, showlegend: true,
-    });
-    curves.forEach(({ name, theta, values, std, whole }, index) => {
-      const colour = palette[index % palette.length];
-      const again = (list) => (whole ? [...list, list[0]] : list);
-      if (std?.some((one) => COVERAGE * one > 0.002 * span)) {
-        const side = (sign) => again(values.map((value, place) => value + sign * COVERAGE * (std[place] || 0)));
-        traces.push({
-          type: "scatterpolar", mode: "lines", theta: [...again(theta), ...again(theta).reverse()], r: [...side(1), ...side(-1).reverse()],
-          fill: "toself", fillcolor: clear(colour, 0.25), line: { width: 0 }, hoverinfo: "skip", showlegend: false, name: `${plain(name)} ± 2 std`,
-        });
-      }
-      const text = again(values.map((value, place) => shown(value, std?.[place])));
-      traces.push({
-        type: "scatterpolar", mode: "lines", name: plain(name) || plain(figure.title), theta: again(theta), r: again(values), text,
-        line: { color: colour, width: 1.8 }, meta: "values", showlegend: curves.length > 1 || name !== "",
-        hovertemplate: `%{theta:.2f}°, %{text} ${figure.y.unit}<extra>%{fullData.name}</extra>`,
-      });
-    });
-    // Peak and valley of a form alone: of several curves the marks would hide each other.
-    const only = curves.length === 1 && figure.id?.startsWith("form") ? curves[0] : null;
-    const extremes = [];
-    if (only) {
-      for (const [name, symbol, better] of [["peak", "triangle-up", (a, b) => a > b], ["valley", "triangle-down", (a, b) => a < b]]) {
-        const at = only.values.reduce((best, value, place) => (better(value, only.values[best]) ? place : best), 0);
-        const said = `${name} ${shown(only.values[at], only.std?.[at])} ${figure.y.unit} at ${only.theta[at].toFixed(1)}°`;
-        extremes.push(said);
-        traces.push({ type: "scatterpolar", mode: "markers", name, theta: [only.theta[at]], r: [only.values[at]], marker: { color: palette[1], size: 11, symbol }, hovertemplate: `${said}<extra></extra>`, showlegend: true });
-      }
-    }
-    const angular = { gridcolor: line, linecolor: faint, ticksuffix: "°", showticksuffix: "all", dtick: 45, direction: "counterclockwise", rotation: 0 };
-    const radial = {
-      range: [-2 * span, span], tickvals: [-span, 0, span], ticktext: [`−${span}`, "0", `+${span}`].map((text) => `${text} ${figure.y.unit}`),
-      angle: 22.5, tickangle: 22.5, gridcolor: line, linecolor: "rgba(0,0,0,0)", tickfont: { size: 11, color: faint },
-    };
-    const place = layout({
-      polar: { bgcolor: "rgba(0,0,0,0)", radialaxis: radial, angularaxis: angular }, margin: { l: 48, r: 48, t: 32, b: 32 }, height: 480,
-    });
-    place.legend = { ...place.legend, y: -0.1 };
-    const magnification = (plot) => {
-      const radius = plot._fullLayout.polar._subplot?.radius;
-      const um = { "µm": 1, nm: 1e-3, mm: 1e3 }[figure.y.unit];
-      if (!radius || !um) return "";
-      const times = (1e3 * MM_PER_PX * radius) / (3 * span * um);
-      return `magnification ${Number(times.toPrecision(2)).toLocaleString("en")} : 1 in print`;
-    };
-    const bounds = curves.map(({ name, std }) => {
-      const same = std?.every((one) => Math.abs(one - std[0]) <= 1e-6 * std[0]) && std[0] > 0;
-      return same ? `${name || figure.title}: U = ${(COVERAGE * std[0]).toPrecision(2)} ${figure.y.unit}` : "";
-    });
-    const said = bounds.filter(Boolean);
-    const bound = said.length && said.length <= 4 ? `${said.join(", ")} (k = 2)` : "";
-    return { traces, layout: place, magnification, said: [...extremes, bound].filter(Boolean).join("; ") };
   }
 
   // A horizontal line across the chart; its name is in the legend, where no curve is below it.
@@ -298,7 +222,7 @@ const Draw = (() => {
     const yaxis = wide ? { type: "log", range: [Math.log10(lowestShown), Math.log10(1.5 * tallest)], dtick: 1, exponentformat: "power" } : { range: [0, 1.06 * tallest] };
     const said = [
       wide ? "logarithmic axis" : "",
-      highest > FIRST_ORDERS ? `orders up to ${highest}: drag the axis, or double-click for all` : "",
+      highest > FIRST_ORDERS ? `the first ${FIRST_ORDERS} of ${highest} orders` : "",
     ].filter(Boolean).join("; ");
     return { traces, layout: layout({ xaxis, yaxis: axis(figure.y, yaxis), height: 380, barmode: "group", bargap: 0.25, ...level(figure) }), said };
   }
@@ -311,12 +235,17 @@ const Draw = (() => {
   }
 
   const SCALE = "Viridis";
+  const LONGEST_SIDE = 6; // Times the shorter one, of a map that keeps its aspect.
   const bar = (map) => ({ title: { text: label(map.height), side: "right" }, thickness: 14, outlinewidth: 0 });
 
   function map(of, { x, y, rows }) {
     const trace = { type: "heatmap", x, y, z: rows, colorscale: SCALE, colorbar: bar(of), hoverinfo: "none", zsmooth: false };
-    const across = axis(of.x, of.radius_mm ? { dtick: 45, range: [x[0], 360] } : {});
-    return { traces: [trace], layout: layout({ xaxis: across, yaxis: axis(of.y, of.radius_mm ? { range: [y[0], y[y.length - 1]] } : {}), height: 460, margin: { l: 64, r: 8, t: 32, b: 52 } }) };
+    const [wide, tall] = [x, y].map((list) => Math.abs(list[list.length - 1] - list[0]));
+    // Lengths along both axes keep their aspect, unless a side would be too short to be seen.
+    const keeps = !of.radius_mm && of.x.unit === of.y.unit && Math.max(wide, tall) < LONGEST_SIDE * Math.min(wide, tall);
+    const across = axis(of.x, of.radius_mm ? { dtick: 45, range: [x[0], 360] } : keeps ? { constrain: "domain" } : {});
+    const along = of.radius_mm ? { range: [y[0], y[y.length - 1]] } : keeps ? { constrain: "domain", scaleanchor: "x" } : {};
+    return { traces: [trace], layout: layout({ xaxis: across, yaxis: axis(of.y, along), height: 460, margin: { l: 64, r: 8, t: 32, b: 52 } }) };
   }
 
   const MOST_SOLID = 160_000; // Points that a phone can still turn.
@@ -366,8 +295,12 @@ const Draw = (() => {
     const curve = panel.curves[0];
     const encoded = (list) => btoa(String.fromCharCode(...new Uint8Array(new Float32Array(list).buffer)));
     [curve.x, curve.y] = [encoded(x), encoded(rows[row])];
-    return { title, ...(of.radius_mm ? polar(figure, panel, 0) : lines(figure, panel)) };
+    return { title, ...(of.radius_mm ? Draw.polar(figure, panel, {}) : lines(figure, panel)) };
   }
 
-  return { amplitudes, bars, grid, lines, map, points, polar, ring, shown, solid, roundedUp };
+  // What can be chosen of a figure, by its kind.
+  const choices = {};
+
+  const parts = { COVERAGE, axis, clear, closed, colours, gaussian, layout, numbers, plain };
+  return { ...parts, amplitudes, bars, choices, grid, lines, map, points, ring, shown, solid, roundedUp };
 })();

@@ -4,7 +4,6 @@
 (() => {
   const data = JSON.parse(document.getElementById("data").textContent);
   const CONFIG = { responsive: true, displaylogo: false, modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"] };
-  const FILTERS = [15, 50, 150, 500];
   const redraws = [];
 
   function element(name, attributes = {}, ...children) {
@@ -19,14 +18,18 @@
   }
 
   // Two charts are beside each other on A4, whose width a browser gives only once it prints.
-  const PAPER = { width: 320, height: 0.75 };
+  const PAPER = { width: 320, wide: 660, height: 0.7 };
   let printing = false;
 
   // Draws into a place of the chart's own height, and as wide as there is room.
   function put(place, { traces, layout: { height, ...layout } }) {
     const high = printing ? PAPER.height * height : height;
     place.style.height = `${high}px`;
-    const size = printing ? { autosize: false, width: PAPER.width, height: high } : { autosize: true };
+    // The first figure has the page's width; a map shares it with its body in space.
+    const width = place.closest(".first") && !place.closest(".map") ? PAPER.wide : PAPER.width;
+    // A lower chart has its legend farther below, by shares of its height.
+    const legend = { ...layout.legend, y: layout.polar ? -0.2 : -0.38 };
+    const size = printing ? { autosize: false, width, height: high, legend } : { autosize: true };
     return Plotly.react(place, traces, { ...layout, ...size }, CONFIG);
   }
 
@@ -60,10 +63,36 @@
     return [step(-1, "‹", "previous"), labelled("of", select), step(1, "›", "next"), element("span", { textContent: `${names.length} in all` })];
   }
 
+  // Selects of what can be chosen of a figure's panel; one choice may change what others there are.
+  function offer(figure, state, holder, draw) {
+    const selects = Draw.choices[figure.kind](figure, figure.panels[state.panel], state).map(({ key, text, options, usual }) => {
+      const select = element("select", {}, ...options.map(([value, textContent]) => element("option", { value, textContent })));
+      select.value = state[key] ?? usual ?? options[0][0];
+      select.addEventListener("change", () => {
+        state[key] = Number.isFinite(Number(select.value)) && select.value !== "" ? Number(select.value) : select.value;
+        if (key === "plane") delete state.layer;
+        draw();
+        offer(figure, state, holder, draw);
+        holder.querySelectorAll("select")[selects.findIndex((label) => label.contains(select))]?.focus();
+      });
+      return labelled(text, select);
+    });
+    holder.replaceChildren(...selects);
+  }
+
+  // A small table with a caption.
+  function written({ caption, head, rows }) {
+    const cells = (kind, row) => row.map((text, column) => element(kind, { textContent: text, className: column ? "number" : "", ...(kind === "th" ? { scope: "col" } : {}) }));
+    const body = element("tbody", {}, ...rows.map((row) => element("tr", {}, ...cells("td", row))));
+    const table = element("table", {}, element("caption", { textContent: caption }), element("thead", {}, element("tr", {}, ...cells("th", head))), body);
+    return element("div", { className: "scroll", tabIndex: 0, role: "region", ariaLabel: caption }, table);
+  }
+
   function chart(figure, box) {
     const controls = element("p", { className: "controls" });
     const readout = element("p", { className: "readout" });
-    const state = { panel: 0, cutoff: 0 };
+    const sheet = element("div", { className: "sheet" });
+    const state = { panel: 0 };
     if (figure.kind === "map") {
       box.append(controls);
       const holder = element("div", { className: "map" });
@@ -75,20 +104,20 @@
     }
     const plot = element("div", { className: "plot", id: `plot-${figure.id}` });
     const draw = () => {
-      const drawn = Draw[figure.kind](figure, figure.panels[state.panel], state.cutoff);
+      const drawn = Draw[figure.kind](figure, figure.panels[state.panel], state);
+      sheet.replaceChildren(...(drawn.table ? [written(drawn.table)] : []));
       return put(plot, drawn).then(() => {
         readout.textContent = [drawn.said, drawn.magnification?.(plot)].filter(Boolean).join("; ");
       });
     };
     if (figure.panels.length > 1) controls.append(...chooser(figure, (index) => { state.panel = index; draw(); }));
-    if (figure.kind === "polar") {
-      const options = [["0", "none"], ...FILTERS.map((upr) => [upr, `Gaussian ${upr} UPR`])];
-      const select = element("select", {}, ...options.map(([value, textContent]) => element("option", { value, textContent })));
-      select.addEventListener("change", () => { state.cutoff = Number(select.value); draw(); });
-      controls.append(labelled("Filter", select));
+    if (Draw.choices[figure.kind]) {
+      const chosen = element("span", { className: "controls" });
+      controls.append(chosen);
+      offer(figure, state, chosen, draw);
     }
     if (controls.childNodes.length) box.append(controls);
-    box.append(plot, readout);
+    box.append(plot, readout, sheet);
     waiting.push({ place: plot, draw });
     redraws.push(draw);
   }
@@ -97,7 +126,7 @@
   function surface(of, box, id) {
     const grid = Draw.grid(of);
     const flat = element("div", { className: "plot", id: `map-${id}` });
-    const readout = element("p", { className: "readout", textContent: `Point at the map for a value; click for the ${of.radius_mm ? "ring" : "profile along " + of.x.name}.` });
+    const readout = element("p", { className: "readout hint", textContent: `Point at the map for a value; click for the ${of.radius_mm ? "ring" : "profile along " + of.x.name}.` });
     const space = element("div", { className: "plot", id: `solid-${id}` });
     const slider = element("input", { type: "range", min: 0, max: 100, value: 50, ariaLabel: "exaggeration of the deviation" });
     const times = element("output", {});
@@ -141,7 +170,10 @@
       space.on("plotly_click", (event) => open(of(event)[0]));
       slider.addEventListener("input", solid);
       // It is drawn too late for print, which takes it as it is, and smaller.
-      redraws.push(() => printing || solid());
+      redraws.push(() => {
+        space.style.zoom = printing ? PAPER.width / space.offsetWidth : "";
+        return printing || solid();
+      });
     });
     // Later than at first, when another panel was chosen.
     if (document.documentElement.dataset.complete) beginFlat().then(beginSolid);
@@ -156,7 +188,8 @@
     const columns = Object.fromEntries(Object.entries(data.values).map(([key, column]) => [key, column.texts ? column.rows.map((row) => column.texts[row]) : column]));
     const values = columns.shown.map((_, row) => Object.fromEntries(Object.entries(columns).map(([key, column]) => [key, column[row]])));
     const [filter, count, all] = ["filter", "shown", "all"].map((id) => document.getElementById(id));
-    const keys = ["place", "symbol", "shown", "unit", "interval", "refers", "note"];
+    const keys = ["place", "symbol", "low", "shown", "high", "unit", "interval", "kind", "refers", "note"];
+    const numeric = new Set(["low", "shown", "high", "interval"]);
     // What a value is by its standard is a footnote of the rows that are shown: its number is in the row, its text below.
     function footnoted(rows) {
       const texts = [...new Set(rows.map((row) => row.about))];
@@ -177,10 +210,11 @@
     function gathered(key, group) {
       const known = group.filter((row) => row.value !== null).sort((a, b) => a.value - b.value);
       if (group.length < 2 || !known.length) return group;
-      const at = (place) => known[place].shown;
       const [first] = group;
-      const shown = [at(0), at((known.length - 1) >> 1), at(known.length - 1)].join(" … ");
-      const head = { ...first, key, place: first.group === "stations" ? `${group.length} stations` : `${first.group}, ${group.length} stations`, shown, interval: "", value: known[(known.length - 1) >> 1].value };
+      const [low, middle, high] = [0, (known.length - 1) >> 1, known.length - 1].map((place) => known[place]);
+      const remark = group.some((row) => row.remark.includes("! ")) ? "! refuted at some" : "";
+      const several = ["stations", "sections"].includes(first.group) ? `${group.length} ${first.group}` : `${first.group}, ${group.length} stations`;
+      const head = { ...first, key, place: several, low: low.shown, shown: middle.shown, high: high.shown, interval: "", kind: "", remark, value: middle.value };
       return open.has(key) ? [head, ...group] : [head];
     }
     const show = () => {
@@ -192,14 +226,16 @@
         listed.sort((a, b) => sign * (key === "value" ? (a.value ?? Infinity) - (b.value ?? Infinity) : String(a[key] ?? "").localeCompare(String(b[key] ?? ""), "en", { numeric: true })));
       }
       const cell = (row, key) => {
-        const made = element("td", key === "shown" || key === "interval" ? { className: "number" } : {});
+        const names = [numeric.has(key) ? "number" : "", key === "low" || key === "high" ? "several" : ""];
+        const made = element("td", { className: names.join(" ").trim() });
         if (key === "place" && row.key) {
           const toggle = () => { open.has(row.key) ? open.delete(row.key) : open.add(row.key); show(); };
           made.append(element("button", { type: "button", className: "opens", textContent: row.place, ariaExpanded: String(open.has(row.key)), onclick: toggle }));
-        } else made.append(key === "place" ? element("bdi", { textContent: row[key] }) : row[key]);
+        } else made.append(key === "place" ? element("bdi", { textContent: row[key] }) : row[key] ?? "");
         return made;
       };
       body.replaceChildren(...footnoted(listed.slice(0, most)).map((row) => element("tr", {}, ...keys.map((key) => cell(row, key)))));
+      document.getElementById("rows").classList.toggle("single", listed.every((row) => row.low === undefined));
       all.hidden = listed.length <= most;
       count.textContent = listed.length > most ? `the first ${most} of ${listed.length} rows` : `${rows.length} values`;
     };
@@ -224,6 +260,10 @@
       area.remove();
       count.textContent = `${rows.length} values copied`;
     });
+    // On paper nothing is left out.
+    let onScreen = most;
+    addEventListener("beforeprint", () => { [onScreen, most] = [most, Infinity]; show(); });
+    addEventListener("afterprint", () => { most = onScreen; show(); });
     show();
   }
 

@@ -1,13 +1,18 @@
 //! What the page's program draws: figures, surface and values as JSON, with numbers in base64.
 
-use base64::{Engine, prelude::BASE64_STANDARD};
 use runout_core::{
     surface::Surface,
     table::panels::{Axis, Curve, Grid, Kind, Panels, Point},
 };
 use serde::Serialize;
 
-use crate::{one_line, symbol, values::Columns};
+use crate::{
+    numbers::Numbers,
+    one_line,
+    shapes::{ArrowsData, CircleData, circles},
+    symbol,
+    values::Columns,
+};
 
 /// Points of a curve that are drawn: more are not visible on a screen.
 const MOST_POINTS: usize = 2880;
@@ -62,6 +67,8 @@ pub(crate) struct PanelData {
     curves: Vec<CurveData>,
     #[serde(skip_serializing_if = "Option::is_none")]
     map: Option<MapData>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    arrows: Option<ArrowsData>,
 }
 
 #[derive(Serialize)]
@@ -81,6 +88,9 @@ struct CurveData {
     /// Whether it is a line where others are points.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     joined: bool,
+    /// Reference circles about which it can be looked at.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    circles: Vec<CircleData>,
 }
 
 /// Heights on a grid, row by row along y.
@@ -101,41 +111,6 @@ pub(crate) struct MapData {
     pub(crate) note: Option<String>,
 }
 
-/// Numbers as short as they can be written.
-#[derive(Serialize)]
-#[serde(untagged)]
-enum Numbers {
-    /// All the same.
-    Same { same: f64, count: usize },
-    /// At equal steps.
-    Steps { from: f64, step: f64, count: usize },
-    /// Little-endian f32 in base64.
-    Each(String),
-}
-
-impl Numbers {
-    fn of(numbers: &[f64]) -> Self {
-        let count = numbers.len();
-        if let (Some(first), Some(last)) = (numbers.first(), numbers.last())
-            && count > 2
-        {
-            let step = (last - first) / (count - 1) as f64;
-            let near = |place: usize, number: f64| {
-                (number - (first + step * place as f64)).abs() <= 1e-9 * first.abs().max(last.abs())
-            };
-            if numbers.iter().enumerate().all(|(place, number)| near(place, *number)) {
-                return if step == 0.0 {
-                    Self::Same { same: *first, count }
-                } else {
-                    Self::Steps { from: *first, step, count }
-                };
-            }
-        }
-        let bytes: Vec<u8> = numbers.iter().flat_map(|number| (*number as f32).to_le_bytes()).collect();
-        Self::Each(BASE64_STANDARD.encode(bytes))
-    }
-}
-
 impl AxisData {
     fn of(axis: &Axis, unit: &str) -> Self {
         Self { name: axis.name.clone(), unit: symbol(unit) }
@@ -148,6 +123,7 @@ impl FigureData {
         match self.kind {
             _ if !self.thinned => None,
             "map" => Some("Of many points, the mean of those in each cell is drawn."),
+            "vectors" => Some("Of many places, some at equal distances are drawn."),
             _ => Some("Of many points, the lowest and the highest of each stretch are drawn."),
         }
     }
@@ -167,7 +143,15 @@ pub(crate) fn figures(all: &[Panels]) -> Vec<FigureData> {
         }
         _ => MOST_POINTS,
     };
-    all.iter().map(|panels| figure(panels, most)).filter(|figure| !figure.panels.is_empty()).collect()
+    let shown = all.iter().filter(|figure| !is_at_one_place(figure));
+    shown.map(|panels| figure(panels, most)).filter(|figure| !figure.panels.is_empty()).collect()
+}
+
+/// Whether nothing is along the horizontal axis: points of one place.
+fn is_at_one_place(figure: &Panels) -> bool {
+    let mut places = figure.drawn.iter().flat_map(|panel| &panel.curves).flat_map(|curve| &curve.points);
+    let first = places.next().map(|point| point.x.to_bits());
+    figure.kind == Kind::Points && places.all(|point| Some(point.x.to_bits()) == first)
 }
 
 fn figure(figure: &Panels, most: usize) -> FigureData {
@@ -177,16 +161,20 @@ fn figure(figure: &Panels, most: usize) -> FigureData {
     let mut panels = Vec::new();
     for panel in &figure.drawn {
         let drawn = |curve: &&Curve| !curve.points.is_empty();
-        let mut data = PanelData { name: one_line(&panel.name), curves: Vec::new(), map: None };
+        let mut data = PanelData { name: one_line(&panel.name), curves: Vec::new(), map: None, arrows: None };
         if figure.kind == Kind::Map {
             let points: Vec<Point> = panel.curves.iter().flat_map(|curve| curve.points.iter().copied()).collect();
             data.map = (!points.is_empty()).then(|| map(figure, &points));
             thinned |= data.map.as_ref().is_some_and(|map| map.thinned);
+        } else if figure.kind == Kind::Vectors {
+            let (arrows, some) = ArrowsData::of(figure, &panel.curves).unzip();
+            data.arrows = arrows;
+            thinned |= some == Some(true);
         } else {
             thinned |= panel.curves.iter().any(|curve| curve.points.len() > most);
             data.curves.extend(panel.curves.iter().filter(drawn).map(|one| curve(&one.thinned(most, scale))));
         }
-        if data.map.is_some() || !data.curves.is_empty() {
+        if data.map.is_some() || data.arrows.is_some() || !data.curves.is_empty() {
             panels.push(data);
         }
     }
@@ -197,6 +185,7 @@ fn figure(figure: &Panels, most: usize) -> FigureData {
         Kind::Points => "points",
         Kind::Bars => "bars",
         Kind::Map => "map",
+        Kind::Vectors => "vectors",
     };
     let (x, y) = (AxisData::of(x, &x.unit), AxisData::of(y, unit));
     let places = figure.places.iter().map(|(x, name)| (*x, one_line(name))).collect();
@@ -216,6 +205,7 @@ fn curve(curve: &Curve) -> CurveData {
         missing: curve.missing.clone(),
         marks: curve.marks.iter().map(|mark| (mark.x, mark.y, one_line(&mark.text))).collect(),
         joined: curve.joined,
+        circles: circles(curve),
     }
 }
 
@@ -279,19 +269,6 @@ mod tests {
     #![allow(clippy::unwrap_used, reason = "tests")]
 
     use super::*;
-
-    fn json(numbers: &[f64]) -> String {
-        serde_json::to_string(&Numbers::of(numbers)).unwrap()
-    }
-
-    #[test]
-    fn numbers_are_short() {
-        assert_eq!(json(&[0.0, 0.5, 1.0, 1.5]), r#"{"from":0.0,"step":0.5,"count":4}"#);
-        assert_eq!(json(&[0.25; 3]), r#"{"same":0.25,"count":3}"#);
-        assert_eq!(json(&[1.0]), "\"AACAPw==\"");
-        assert_eq!(json(&[]), "\"\"");
-        assert!(json(&[f64::NAN; 4]).starts_with('"'));
-    }
 
     #[test]
     fn a_surface_says_what_is_left_out() {

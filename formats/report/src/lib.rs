@@ -15,10 +15,12 @@ mod data;
 mod facts;
 mod first;
 mod limits;
+mod numbers;
 mod origin;
 mod overview;
 mod page;
 mod rig;
+mod shapes;
 mod values;
 
 use std::path::PathBuf;
@@ -101,7 +103,7 @@ struct Collected {
 
 impl Export for Collected {
     fn rows(&mut self, table: &TableSpec, rows: &RecordBatch) -> Result<()> {
-        self.figures.iter_mut().filter(|figure| figure.table == table.name).for_each(|figure| figure.add(rows));
+        self.figures.iter_mut().for_each(|figure| figure.take(&table.name, rows));
         Ok(())
     }
 

@@ -16,7 +16,11 @@ use crate::{
 const CHARTS: &str = include_str!("../assets/plotly/plotly.min.js");
 const CANVAS: &str = include_str!("../assets/canvas.js");
 const PROGRAM: &str = include_str!("../assets/report.js");
-const DRAWING: &str = include_str!("../assets/draw.js");
+const DRAWING: &str = concat!(
+    include_str!("../assets/draw.js"),
+    include_str!("../assets/polar.js"),
+    include_str!("../assets/vectors.js")
+);
 const STYLE: &str = include_str!("../assets/report.css");
 
 /// The page of a result.
@@ -66,7 +70,9 @@ pub(crate) fn page(title: &str, figures: &[Panels], result: &Completed) -> Resul
         (origin::turns(summary))
         (origin::notes(summary))
         @if overview.is_none() {
-            section #facts { h2 { "Part and measurement" } (facts::list(summary, rig.as_ref(), surface)) }
+            @if let Some(facts) = facts::list(summary, rig.as_ref(), surface) {
+                section #facts { h2 { "Part and measurement" } (facts) }
+            }
             @if let Some(rig) = &rig { (rig_section(rig)) }
         }
         (origin::provenance(summary, about))
@@ -107,9 +113,12 @@ fn table(count: usize) -> Markup {
                         tr {
                             th scope="col" { button type="button" data-key="place" { "where" } }
                             th scope="col" { button type="button" data-key="symbol" { "symbol" } }
-                            th.number scope="col" { button type="button" data-key="value" { "value ± std" } }
+                            th.number.several scope="col" { "lowest" }
+                            th.number scope="col" { button type="button" data-key="value" { "value ± std" span.several { ", median" } } }
+                            th.number.several scope="col" { "highest" }
                             th scope="col" { button type="button" data-key="unit" { "unit" } }
-                            th.number scope="col" { "95 % coverage interval" }
+                            th.number scope="col" { "95 % interval" }
+                            th scope="col" { button type="button" data-key="kind" { "of" } }
                             th scope="col" { button type="button" data-key="refers" { "reference, filter" } }
                             th scope="col" { "note" }
                         }
@@ -117,7 +126,7 @@ fn table(count: usize) -> Markup {
                     tbody {}
                 }
             }
-            p.note { "A row of several stations opens by a click. Numbers of notes:" }
+            p.note.hint { "A row of several stations or sections opens by a click." }
             ol #footnotes.note {}
         }
     }

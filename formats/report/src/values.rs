@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 
 use runout_core::{
+    draws::IntervalKind,
     summary::Summary,
     table::number::{significant, with_std},
 };
@@ -24,6 +25,8 @@ struct Row {
     unit: String,
     /// 95 % interval as it is shown.
     interval: String,
+    /// What the interval contains.
+    kind: &'static str,
     /// Reference and filter.
     refers: String,
     /// Values of one quantity at several stations have the same: of a section, of all of a station.
@@ -44,6 +47,7 @@ pub(crate) struct Columns {
     std: Vec<Option<f64>>,
     unit: Column,
     interval: Vec<String>,
+    kind: Column,
     refers: Column,
     group: Column,
     remark: Column,
@@ -82,6 +86,7 @@ impl Columns {
             all.std.push(row.std);
             all.unit.add(row.unit);
             all.interval.push(row.interval);
+            all.kind.add(row.kind.to_owned());
             all.refers.add(row.refers);
             all.group.add(row.group);
             all.remark.add(row.remark);
@@ -121,8 +126,11 @@ fn rows(summary: &Summary) -> Vec<Row> {
             std,
             unit: symbol(&value.unit),
             interval: uncertainty.map_or_else(String::new, |known| interval((known.interval_95, known.std))),
+            kind: uncertainty.map_or("", |known| known.kind.name()),
             refers: [value.reference.as_str(), value.filter.as_str()].join(", "),
             group: match (placed.station, placed.section) {
+                // Where each section is a station of its own, all sections are alike.
+                (Some(station), Some(section)) if station == section => "sections".into(),
                 (Some(_), Some(section)) => format!("section {}", one_line(section)),
                 (Some(_), None) => "stations".into(),
                 (None, _) => String::new(),
@@ -144,6 +152,7 @@ fn rows(summary: &Summary) -> Vec<Row> {
         std: value.std,
         unit: symbol(&value.unit),
         interval: value.interval_95.zip(value.std).map_or_else(String::new, interval),
+        kind: value.interval_95.map_or("", |_| IntervalKind::Coverage.name()),
         refers: [&value.reference, &value.filter].into_iter().flatten().cloned().collect::<Vec<_>>().join(", "),
         group: String::new(),
         remark: reason(value.refuted_by.as_ref()),

@@ -14,6 +14,7 @@ mod sheets;
 mod xlsx;
 
 use runout_core::{
+    draws::IntervalKind,
     pipeline::{Plugin, Registry},
     summary::{Decision, ReportedValue},
 };
@@ -50,7 +51,7 @@ impl<'a> Cell<'a> {
 }
 
 /// Names of the columns, with the width of a sheet's column in characters.
-const COLUMNS: [(&str, u16); 16] = [
+const COLUMNS: [(&str, u16); 17] = [
     ("station", 12),
     ("of", 16),
     ("z_mm", 10),
@@ -62,6 +63,7 @@ const COLUMNS: [(&str, u16); 16] = [
     ("std", 12),
     ("low_95", 12),
     ("high_95", 12),
+    ("interval", 10),
     ("lower_limit", 12),
     ("upper_limit", 12),
     ("decision", 16),
@@ -85,6 +87,7 @@ fn row<'a>(value: &ReportedValue<'a>) -> [Cell<'a>; COLUMNS.len()] {
         Cell::number(value.std),
         Cell::number(low),
         Cell::number(high),
+        Cell::text(value.interval.map(IntervalKind::name)),
         Cell::number(limit.and_then(|limit| limit.lower)),
         Cell::number(limit.and_then(|limit| limit.upper)),
         Cell::text(decision(value).map(decision_name)),

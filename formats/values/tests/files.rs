@@ -50,7 +50,7 @@ fn summary() -> Summary {
     });
     let mut summary: Summary = serde_json::from_value(whole).unwrap();
     let limit = serde_json::from_value(json!({ "symbol": "RONt", "unit": "um", "upper": UPPER_UM })).unwrap();
-    let limits = decide(&[limit], &summary.placed_values()).0;
+    let limits = decide(&[limit], &summary.placed_values()).unwrap().0;
     summary.limits = limits;
     summary
 }

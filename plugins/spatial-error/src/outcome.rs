@@ -36,6 +36,7 @@ pub(crate) fn tables(chain: &Chain) -> Vec<TableSpec> {
     let mut prediction: Vec<ColumnSpec> = places().into();
     prediction.extend(each("", "what would be read, without noise, at the time of the first reading"));
     prediction.extend(each("std_", "its standard uncertainty, without the noise of a further reading"));
+    prediction.extend(each("error_", "the error of the machine: the same without the placement of the tracker"));
     prediction.push(extrapolated());
     let mut residual = vec![ColumnSpec::count("reading", "", "number of the reading, from 0")];
     residual.extend(places());
@@ -53,18 +54,18 @@ pub(crate) fn tables(chain: &Chain) -> Vec<TableSpec> {
     let prediction = TableSpec::new("prediction", "predicted readings; NaN where nothing is predicted", prediction);
     let residual = TableSpec::new("residual", "residual of each reading", residual);
     vec![
-        ["x", "y", "z"].into_iter().fold(prediction, |table, axis| table.figure(predicted_along(axis))),
+        prediction.figure(error_map()),
         COMPONENTS.into_iter().fold(residual, |table, one| table.figure(before_and_after(one))).figure(left_out()),
         variogram::table(),
         TableSpec::new("compensation", "corrections, without the placement of the tracker", compensation),
     ]
 }
 
-/// The predicted error with its uncertainty over the command of one axis.
-fn predicted_along(axis: &str) -> Figure {
-    let value = |one: &str| Measure::new(format!("{one}_um")).with_std(format!("std_{one}_um")).with_symbol(one);
-    let title = format!("Predicted error over {axis}");
-    Figure::points(format!("prediction-{axis}"), title, format!("{axis}_mm"), COMPONENTS.map(value))
+/// The error of the machine at the places of the query, as vectors.
+fn error_map() -> Figure {
+    let place = ["x", "y", "z"].map(|axis| format!("{axis}_mm"));
+    let vector = COMPONENTS.map(|one| format!("error_{one}_um"));
+    Figure::vectors("error-map", "Error of the machine", place, vector)
 }
 
 /// A component of each reading, and what the fit leaves of it.
@@ -189,6 +190,7 @@ fn prediction_columns(queries: &[At]) -> Vec<ArrayRef> {
     columns.extend([0, 1, 2].map(|axis| numbers(queries.iter().map(|query| query.predicted[axis].mean_um))));
     columns
         .extend([0, 1, 2].map(|axis| numbers(queries.iter().map(|query| query.predicted[axis].variance_um2.sqrt()))));
+    columns.extend([0, 1, 2].map(|axis| numbers(queries.iter().map(|query| query.error_um[axis]))));
     columns.push(flags(queries.iter().map(|query| query.extrapolated)));
     columns
 }

@@ -41,11 +41,7 @@ fn section(id: &str, z_mm: f64) -> SectionSummary {
         filter: "none".into(),
         reference: "LSCI".into(),
         coverage: 1.0,
-        uncertainty: std.map(|std| Uncertainty {
-            std,
-            interval_95: [value - 2.0 * std, value + 2.0 * std],
-            draws: 400,
-        }),
+        uncertainty: std.map(|std| Uncertainty::new(std, [value - 2.0 * std, value + 2.0 * std], 400)),
     };
     SectionSummary {
         section: id.into(),
@@ -73,7 +69,7 @@ fn motion_values(size: f64) -> Vec<Value> {
         filter: "none".into(),
         reference: reference.into(),
         coverage: 1.0,
-        uncertainty: std.map(|std| Uncertainty { std, interval_95: [value, value], draws: 0 }),
+        uncertainty: std.map(|std| Uncertainty::new(std, [value, value], 0)),
     };
     vec![
         value("synchronous-radial-x", "um", "LSC", 3.2 * size, Some(0.004)),

@@ -7,6 +7,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use super::{polar::seen_from, *};
+use runout_draws::IntervalKind;
 use runout_numerics::Complex64;
 use runout_standards::roundness::ront_lsci_um;
 use runout_turning::{azimuth::Azimuth, profile::TurnCount, separation::Residual, spread::Projection};
@@ -344,6 +345,9 @@ fn setups_tell_the_uncertainty_of_a_range() {
     let known = between_setups(&[1.0, 1.1, 1.2], 0.0).unwrap();
     let half = 4.302_653 * 0.1 * (4.0_f64 / 3.0).sqrt();
     assert!((known.std - 0.1).abs() < 1e-12);
+    // It is of another capture, and stays so where a declared form widens it.
+    assert_eq!(known.kind, IntervalKind::Prediction);
+    assert_eq!(bounded(Some(known.clone()), 0.1).map(|wider| wider.kind), Some(IntervalKind::Prediction));
     // The table's last digit.
     assert!((known.interval_95[0] - (1.1 - half)).abs() < 1e-6 && (known.interval_95[1] - (1.1 + half)).abs() < 1e-6);
 }

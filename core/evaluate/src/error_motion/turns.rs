@@ -1,6 +1,6 @@
 //! Ranges and root mean squares over the turns of setups.
 
-use runout_draws::{NORMAL_95, Uncertainty, student_95};
+use runout_draws::{IntervalKind, NORMAL_95, Uncertainty, student_95};
 use runout_turning::spread::{Direction, Spread};
 
 /// The directions that some setup gives, each once.
@@ -67,7 +67,8 @@ pub(super) fn between_setups(each: &[f64], std: f64) -> Option<Uncertainty> {
     let scatter = (each.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / freedom as f64).sqrt();
     let student = student_95(freedom as f64);
     let half = (student * scatter * (1.0 + 1.0 / count).sqrt()).hypot(NORMAL_95 * std);
-    Some(Uncertainty { std: scatter.hypot(std), interval_95: [(mean - half).max(0.0), mean + half], draws: 0 })
+    let known = Uncertainty::new(scatter.hypot(std), [(mean - half).max(0.0), mean + half], 0);
+    Some(Uncertainty { kind: IntervalKind::Prediction, ..known })
 }
 
 /// The uncertainty of a value that a declared form may move by up to `bound` either way, as likely to anything within it; the

@@ -134,7 +134,7 @@ impl ResultWriter {
     pub(super) fn take(&mut self, station: &EvaluatedStation, rig: Option<&Rig>) -> Result<()> {
         let result = &station.result;
         self.interrupted |= result.separation.sections.iter().any(|section| !section.gaps.is_empty());
-        let tables = self.station_tables.rows(result, self.tables_wanted)?;
+        let tables = self.station_tables.rows_of(station, self.tables_wanted)?;
         self.write(&tables)?;
         if let Some(sections) = &mut self.sections {
             sections.add(result);
@@ -258,7 +258,7 @@ impl ResultWriter {
         let own = self.summary.own_values();
         let own = self.evaluated.placed().chain(own.iter().map(values::PlacedValue::own));
         let placed: Vec<_> = self.summary.placed_values().into_iter().chain(own).collect();
-        let (limits, unmatched) = values::decide(self.evaluate.limits(), &placed);
+        let (limits, unmatched) = values::decide(self.evaluate.limits(), &placed)?;
         self.summary.limits = limits;
         self.gather_warnings(remarks.into_iter().chain(unmatched));
         let values = if self.of_form {

@@ -12,7 +12,7 @@ use runout_turning::{
 };
 
 pub(super) fn summarise(station: &EvaluatedStation, rig: Option<&Rig>) -> StationSummary {
-    let EvaluatedStation { result, values, motion_values, readings } = station;
+    let EvaluatedStation { result, values, motion_values, readings, .. } = station;
     let separation = &result.separation;
     let known = |value: f64| value.is_finite().then_some(value);
     let nothing = separation.has_no_observable_form();

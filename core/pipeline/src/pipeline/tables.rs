@@ -1,5 +1,6 @@
 //! The tables of form and motion: their columns, and the rows of one station.
 
+mod circles;
 mod content;
 mod reading;
 mod residual;
@@ -13,10 +14,12 @@ use crate::{
     stage::{About, Completed, Export, ResultInfo},
     summary::Summary,
 };
+use circles::{circle_rows, circles};
 use content::Content;
 use reading::{reading, reading_rows};
 use residual::{residual, residual_rows};
 use runout_error::Result;
+use runout_evaluate::EvaluatedStation;
 use runout_table::{
     ArrayRef, ColumnSpec, Figure, Measure, TableRows, TableSpec, counts, flags, no_numbers, numbers, stretches,
     texts_or_null,
@@ -34,6 +37,8 @@ use values::{values, values_rows};
 
 const STATION: &str = "name of the axial station";
 const SECTION: &str = "id of the section";
+/// Name of the table of reference circles.
+const CIRCLES: &str = "circles";
 /// Unit of coefficients, whose rows are of all quantities.
 const MIXED: &str = "um; urad for tilt";
 
@@ -41,6 +46,7 @@ const MIXED: &str = "um; urad for tilt";
 #[derive(Debug, Clone)]
 pub struct StationTables {
     form: TableSpec,
+    circles: TableSpec,
     motion: TableSpec,
     harmonics: TableSpec,
     reading: TableSpec,
@@ -67,6 +73,7 @@ impl StationTables {
         let axial = unknowns().any(|unknown| *unknown == Quantity::Z);
         Self {
             form: form(),
+            circles: circles(),
             motion: motion(line, axial),
             harmonics: harmonics(),
             reading: reading(),
@@ -105,10 +112,24 @@ impl StationTables {
     #[must_use]
     pub fn specs(&self) -> Vec<TableSpec> {
         let mut all: Vec<TableSpec> =
-            [&self.form, &self.motion, &self.harmonics, &self.reading, &self.residual].map(Clone::clone).into();
+            [&self.form, &self.circles, &self.motion, &self.harmonics, &self.reading, &self.residual]
+                .map(Clone::clone)
+                .into();
         all.extend(self.turns.iter().cloned());
         all.push(self.values.clone());
         all
+    }
+
+    /// Rows of one station with its reference circles.
+    ///
+    /// # Errors
+    /// As [`rows`](Self::rows).
+    pub fn rows_of(&mut self, station: &EvaluatedStation, wanted: bool) -> Result<Vec<TableRows>> {
+        let mut all = self.rows(&station.result, wanted)?;
+        if wanted && station.circles.iter().any(|circles| !circles.is_empty()) {
+            all.push(TableRows { table: self.circles.name.clone(), rows: self.circles.rows(circle_rows(station))? });
+        }
+        Ok(all)
     }
 
     /// Rows of one station, by table; none where they are not `wanted`. A layout that separates nothing gives rows of the
@@ -217,7 +238,8 @@ fn form() -> TableSpec {
     .figure(
         Figure::polar("form", "Form", "angle_deg", [Measure::new("form_um").with_std("std_um")])
             .panels(["station"])
-            .curves(["section"]),
+            .curves(["section"])
+            .circles(CIRCLES),
     )
 }
 

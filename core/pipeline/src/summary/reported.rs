@@ -2,6 +2,7 @@
 
 use std::collections::HashMap;
 
+use runout_draws::IntervalKind;
 use runout_evaluate::{Limit, LimitValue, NamedValue, PlacedValue, ValueId};
 
 use super::Summary;
@@ -20,8 +21,10 @@ pub struct ReportedValue<'a> {
     pub value: Option<f64>,
     /// Its standard uncertainty; none where it is not known.
     pub std: Option<f64>,
-    /// Where the truth lies with 95 % probability; none where that is not known.
+    /// Its interval of 95 %; none where that is not known.
     pub interval_95: Option<[f64; 2]>,
+    /// What that contains.
+    pub interval: Option<IntervalKind>,
     /// Its unit; empty for a number without one.
     pub unit: &'a str,
     /// What it is, with standard and clause.
@@ -61,6 +64,7 @@ impl<'a> From<PlacedValue<'a>> for ReportedValue<'a> {
             value: Some(value.value).filter(|value| value.is_finite()),
             std: value.uncertainty.as_ref().map(|known| known.std),
             interval_95: value.uncertainty.as_ref().map(|known| known.interval_95),
+            interval: value.uncertainty.as_ref().map(|known| known.kind),
             unit: &value.unit,
             about: &value.source,
             no_uncertainty: value.no_uncertainty.as_deref(),
@@ -79,6 +83,7 @@ impl<'a> From<&'a NamedValue> for ReportedValue<'a> {
             value: value.value,
             std: value.std,
             interval_95: value.interval_95,
+            interval: value.interval_95.map(|_| IntervalKind::Coverage),
             unit: &value.unit,
             about: &value.about,
             no_uncertainty: value.no_uncertainty.as_deref(),
@@ -158,7 +163,7 @@ mod tests {
         let mut own = NamedValue::new("gain", f64::NAN, f64::NAN, "", "gain of the probe").of("probe");
         own.refuted_by = Some("repeats".into());
         let mut summary = Summary { stations: vec![station], values: vec![own], ..Summary::default() };
-        let limits: Vec<LimitSummary> = decide(&[limit(1.0), limit(2.0)], &summary.placed_values()).0;
+        let limits: Vec<LimitSummary> = decide(&[limit(1.0), limit(2.0)], &summary.placed_values()).unwrap().0;
         summary.limits = limits;
         let all = summary.reported_values();
         assert_eq!(all.len(), 5);

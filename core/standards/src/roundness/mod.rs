@@ -31,7 +31,7 @@ pub use super::reference::{Reference, Undetermined};
 pub use crests::{Heights, Sum};
 pub use disturbed::{CircleSearch, Disturbed};
 pub use points::{Angles, Points};
-pub use series::{Series, between_angles};
+pub use series::{Located, Series, between_angles};
 
 /// A reference circle.
 #[derive(Debug, Clone, PartialEq)]

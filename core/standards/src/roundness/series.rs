@@ -1,6 +1,6 @@
 //! Reference circles of a profile that is a finite sum of harmonics: contacts between the angles.
 
-use std::cell::RefCell;
+use std::{cell::RefCell, f64::consts::TAU};
 
 use super::{Angles, Circle, Points, Reference, Undetermined, Values};
 use crate::extremes::extremes;
@@ -21,6 +21,17 @@ pub fn between_angles(
     reference: Reference,
 ) -> Result<(Circle, Values), Undetermined> {
     Series::new(harmonics, profile_um, radius_mm).about(reference)
+}
+
+/// A reference circle with the two places of the profile that are farthest from it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Located {
+    /// The circle.
+    pub circle: Circle,
+    /// Angle of the highest point, in rad from 0 to 2π, and its deviation from the circle, in µm.
+    pub peak: [f64; 2],
+    /// The same of the lowest point.
+    pub valley: [f64; 2],
 }
 
 /// A profile Re Σ cₙ e^{inθ} about a circle, for several of its reference circles.
@@ -70,6 +81,25 @@ impl<'a> Series<'a> {
     pub fn about(&mut self, reference: Reference) -> Result<(Circle, Values), Undetermined> {
         let count = self.profile_um.len();
         self.with_contacts(reference, |points, circle| (circle.clone(), points.values_of_first(circle, count)))
+    }
+
+    /// A reference circle and where the profile is highest and lowest about it: RONt is the difference of both deviations.
+    ///
+    /// # Errors
+    /// As [`Points::determine`].
+    pub fn located(&mut self, reference: Reference) -> Result<Located, Undetermined> {
+        self.with_contacts(reference, |points, circle| {
+            let there = || points.deviations_um(circle).enumerate().filter(|(_, deviation)| !deviation.is_nan());
+            let by_height = |(_, one): &(usize, f64), (_, other): &(usize, f64)| one.total_cmp(other);
+            let place = |found: Option<(usize, f64)>| {
+                let (point, deviation) = found?;
+                let [x, y] = points.cloud.features(point);
+                Some([y.atan2(x).rem_euclid(TAU), deviation])
+            };
+            let [peak, valley] = [place(there().max_by(by_height)), place(there().min_by(by_height))];
+            let lost = [f64::NAN; 2];
+            Located { circle: circle.clone(), peak: peak.unwrap_or(lost), valley: valley.unwrap_or(lost) }
+        })
     }
 
     /// RONt alone about a reference circle.
@@ -177,6 +207,38 @@ mod tests {
         }
         // Nearly opposite contacts hold the centre along their chord by differences of rounding's size.
         assert!(worst < 2e-4, "{worst}");
+    }
+
+    /// Three lobes about a centre that is known: peak and valley are where the wave has them, and RONt is between them.
+    #[test]
+    fn peak_and_valley_are_where_the_profile_has_them() {
+        let mut harmonics = vec![Complex64::ZERO; 12];
+        harmonics[3] = Complex64::from_polar(2.0, 0.4);
+        // A crest that is higher than the other two, between the angles.
+        harmonics[11] = Complex64::from_polar(0.3, 0.0);
+        let profile_um = on(&harmonics, 180);
+        let height = |angle: f64| 2.0 * (3.0 * angle + 0.4).cos() + 0.3 * (11.0 * angle).cos();
+        let dense = (0..360_000).map(|step| f64::from(step) * TAU / 360_000.0);
+        let highest = dense.clone().max_by(|one, other| height(*one).total_cmp(&height(*other))).unwrap();
+        let lowest = dense.min_by(|one, other| height(*one).total_cmp(&height(*other))).unwrap();
+        let mut series = Series::new(&harmonics, &profile_um, RADIUS_MM);
+        let found = series.located(Reference::LeastSquares).unwrap();
+        let expected = [[highest, height(highest)], [lowest, height(lowest)]];
+        for ([angle, deviation], [at, by]) in [found.peak, found.valley].into_iter().zip(expected) {
+            assert!((angle - at).abs() < 1e-3 && (deviation - by).abs() < 1e-3, "{found:?} {at} {by}");
+        }
+        for reference in Reference::ALL {
+            let found = series.located(reference).unwrap();
+            let ront_um = series.ront_um(reference).unwrap();
+            assert!((found.peak[1] - found.valley[1] - ront_um).abs() < 1e-9, "{reference:?} {found:?} {ront_um}");
+            let side = match reference {
+                Reference::MaximumInscribed => found.valley[1],
+                Reference::MinimumCircumscribed => found.peak[1],
+                Reference::MinimumZone => found.peak[1] + found.valley[1],
+                Reference::LeastSquares => 0.0,
+            };
+            assert!(side.abs() < 1e-9, "{reference:?} {found:?}");
+        }
     }
 
     /// Two lobes and little else have contacts between angles that are the same but for rounding: these circles are found too.

@@ -1,7 +1,7 @@
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 use super::*;
-use crate::{ColumnSpec, counts, numbers, texts};
+use crate::{ColumnSpec, Measure, counts, numbers, texts};
 
 fn table() -> TableSpec {
     TableSpec::new(
@@ -111,4 +111,64 @@ fn what_all_curves_share_is_one_line() {
     let found: Vec<_> =
         panels.drawn[0].curves.iter().map(|one| (one.name.as_str(), one.points.len(), one.joined)).collect();
     assert_eq!(found, [("forward", 2, false), ("1/rev", 2, true), ("backward", 2, false)]);
+}
+
+/// A circle belongs to the curve of its station and section; what is not known of it is NaN.
+#[test]
+fn circles_go_to_their_curves() {
+    let names = || [ColumnSpec::name("station", "station"), ColumnSpec::name("section", "section")];
+    let [station, section] = names();
+    let form = TableSpec::new(
+        "form",
+        "form",
+        vec![station, section, ColumnSpec::number("angle_deg", "deg", ""), ColumnSpec::number("form_um", "um", "")],
+    );
+    let circles = TableSpec::new("circles", "circles", names().into_iter().chain(crate::circles::columns()).collect());
+    let figure = Figure::polar("form", "Form", "angle_deg", [Measure::new("form_um")])
+        .panels(["station"])
+        .curves(["section"])
+        .circles("circles");
+    let mut panels = Panels::new(&form, &figure, 4).unwrap();
+    let one = |values: [f64; 2]| values.map(|value| numbers([value, value]));
+    let rows =
+        form.rows(vec![texts(["s1", "s1"]), texts(["a", "b"]), numbers([0.0, 0.0]), numbers([0.01, 0.02])]).unwrap();
+    panels.take("form", &rows);
+    let mut columns = vec![texts(["s1", "s9"]), texts(["b", "b"]), texts(["none", "none"]), numbers([0.0, 0.0])];
+    columns.push(texts(["MZCI", "MZCI"]));
+    columns.extend(one([1.0, 2.0]));
+    columns.push(numbers([3.0, 3.0]));
+    columns.extend([numbers([4.0, 4.0]), crate::numbers_or_null([None, None])]);
+    columns.push(crate::texts_or_null([Some("a test"), None]));
+    columns.extend(one([30.0, 0.5]));
+    columns.extend(one([60.0, -0.5]));
+    columns.extend([crate::numbers_or_null([None, None]), crate::numbers_or_null([None, None])]);
+    panels.take("circles", &circles.rows(columns).unwrap());
+    let [a, b] = &panels.drawn[0].curves[..] else { panic!("two curves") };
+    assert!(a.circles.is_empty() && panels.drawn.len() == 1);
+    // Heights below 0.1 µm are shown in nm.
+    let (scale, unit) = panels.scaled();
+    assert_eq!(unit, "nm");
+    let [found] = &b.thinned(10, scale).circles[..] else { panic!("one circle") };
+    assert_eq!((found.symbol.as_str(), found.filter.as_str(), found.gaussian_upr), ("MZCI", "none", 0.0));
+    assert_eq!(
+        (found.centre, found.radius, found.peak, found.valley),
+        ([1e3, 2e3], 3e3, [30.0, 500.0], [60.0, -500.0])
+    );
+    assert!(found.is_refuted && found.ront[0] == 4e3 && found.ront[1].is_nan() && found.eccentricity[0].is_nan());
+}
+
+#[test]
+fn vectors_have_places_and_axes() {
+    let names = ["x_mm", "y_mm", "z_mm", "dx_um", "dy_um", "dz_um"];
+    let columns = names.map(|name| ColumnSpec::number(name, &name[name.len() - 2..], ""));
+    let table = TableSpec::new("prediction", "prediction", columns.into());
+    let [x, y, z, dx, dy, dz] = names.map(str::to_owned);
+    let figure = Figure::vectors("map", "Map", [x, y, z], [dx, dy, dz]);
+    let mut panels = Panels::new(&table, &figure, 4).unwrap();
+    let number = |column: usize| numbers([f64::from(column as u32), if column == 4 { f64::NAN } else { 1.0 }]);
+    panels.take("prediction", &table.rows((0..6).map(number).collect()).unwrap());
+    let [curve] = &panels.drawn[0].curves[..] else { panic!("one curve") };
+    assert_eq!(curve.arrows, [Arrow { place: [0.0, 1.0, 2.0], vector: [3.0, 4.0, 5.0] }]);
+    let shown: Vec<&str> = panels.vector.iter().map(|axis| axis.name.as_str()).collect();
+    assert_eq!((shown, panels.height().name.as_str()), (vec!["dx", "dy", "dz"], "z"));
 }

@@ -12,7 +12,7 @@ use runout_core::{
     stage::About,
     summary::Summary,
     surface::Surface,
-    table::{ArrayRef, ColumnSpec, Figure, RecordBatch, TableSpec, numbers, texts},
+    table::{ArrayRef, ColumnSpec, Figure, RecordBatch, TableSpec, circles, numbers, texts},
 };
 use serde::de::DeserializeOwned;
 
@@ -60,10 +60,14 @@ pub fn read_result(path: &Path) -> Result<StoredResult> {
     let figures: Vec<(String, Vec<Figure>)> =
         serde_json::from_str(&figures).map_err(|error| place.error(format!("attribute `{FIGURES}`: {error}")))?;
     let mut tables = Vec::new();
+    let circles: Vec<(String, Vec<String>)> =
+        figures.iter().flat_map(|(_, figures)| figures).filter_map(circles_of).collect();
     // A result may lack a table that is optional.
     for (name, figures) in figures.into_iter().filter(|(name, _)| file.link_exists(name)) {
         let (group, place) = node::group(&file, &place, &name)?;
-        tables.push(table(&group, &place, &name, figures)?);
+        let mut wanted: Vec<String> = figures.iter().flat_map(Figure::columns).map(str::to_owned).collect();
+        wanted.extend(circles.iter().filter(|(table, _)| *table == name).flat_map(|(_, columns)| columns.clone()));
+        tables.push(table(&group, &place, &name, wanted, figures)?);
     }
     let convention = node::text(&file, &place, "convention")?.unwrap_or_default();
     let mut summary: Summary = document(&file, &place, SUMMARY)?;
@@ -87,7 +91,9 @@ pub(super) const FIGURES: &str = "figures";
 
 /// What to draw of which table, in the order in which they are declared.
 pub(super) fn figures(tables: &[TableSpec]) -> hdf5_metno::Result<String> {
-    let drawn = tables.iter().filter(|table| !table.figures.is_empty());
+    let named: Vec<&String> =
+        tables.iter().flat_map(|table| &table.figures).filter_map(|one| one.circles.as_ref()).collect();
+    let drawn = tables.iter().filter(|table| !table.figures.is_empty() || named.contains(&&table.name));
     let figures: Vec<(&str, &[Figure])> = drawn.map(|table| (table.name.as_str(), table.figures.as_slice())).collect();
     serde_json::to_string(&figures).map_err(|error| format!("the figures: {error}").into())
 }
@@ -104,18 +110,25 @@ fn document<T: DeserializeOwned>(file: &File, place: &Place, name: &str) -> Resu
     })
 }
 
-/// A table with the columns that its figures need.
+/// The table of reference circles that a figure names, with its columns.
+fn circles_of(figure: &Figure) -> Option<(String, Vec<String>)> {
+    let names = figure.panels.iter().chain(&figure.curves).cloned();
+    let columns = circles::columns().into_iter().map(|column| column.name);
+    Some((figure.circles.clone()?, names.chain(columns).collect()))
+}
+
+/// A table with some of its columns, and its figures.
 fn table(
     group: &hdf5_metno::Group,
     place: &Place,
     name: &str,
+    mut wanted: Vec<String>,
     figures: Vec<Figure>,
 ) -> Result<(TableSpec, RecordBatch)> {
-    let mut wanted: Vec<&str> = figures.iter().flat_map(Figure::columns).collect();
     wanted.sort_unstable();
     wanted.dedup();
     let (mut specs, mut columns) = (Vec::new(), Vec::new());
-    for column in wanted {
+    for column in &wanted {
         let (dataset, place) = node::dataset(group, place, column)?;
         let unit = node::text(&dataset, &place, "unit")?.unwrap_or_default();
         let (values, is_number) = column_values(&dataset, &place)?;

@@ -65,6 +65,11 @@ pub(super) fn values() -> TableSpec {
             uncertain("std", "standard uncertainty"),
             uncertain("low_95", "lower end of the 95 % interval"),
             uncertain("high_95", "upper end of the 95 % interval"),
+            ColumnSpec::text(
+                "interval",
+                "what the interval contains: coverage, the true value; prediction, the value of another capture; null without one",
+            )
+            .or_null(),
             ColumnSpec::count("draws", "", "draws of the Monte Carlo; null without uncertainty").or_null(),
             ColumnSpec::text(
                 "no_uncertainty",
@@ -104,6 +109,7 @@ pub(super) fn values_rows(summary: &Summary) -> Vec<ArrayRef> {
         uncertainty(|uncertainty| uncertainty.std),
         uncertainty(|uncertainty| uncertainty.interval_95[0]),
         uncertainty(|uncertainty| uncertainty.interval_95[1]),
+        texts_or_null(rows.iter().map(|row| row.value.uncertainty.as_ref().map(|uncertainty| uncertainty.kind.name()))),
         counts_or_null(rows.iter().map(|row| row.value.uncertainty.as_ref().map(|uncertainty| uncertainty.draws))),
         texts_or_null(rows.iter().map(|row| row.value.no_uncertainty.as_deref())),
         numbers_or_null(rows.iter().map(|row| row.value.raised_by_noise)),
