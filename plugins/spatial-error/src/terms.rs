@@ -69,8 +69,9 @@ impl Between {
             from if from < 2.0 => ((-0.5 * from + 2.5) * from - 4.0) * from + 2.0,
             _ => 0.0,
         };
-        // A node before the first one continues the parabola of the first three, and one after the last.
-        let beyond = |from_end: usize| [3.0, -3.0, 1.0].get(from_end).copied().unwrap_or(0.0);
+        // A node before the first one, and one after the last, continues the polynomial of four nodes, or three.
+        let ends: &[f64] = if nodes > 3 { &[4.0, -6.0, 4.0, -1.0] } else { &[3.0, -3.0, 1.0] };
+        let beyond = |from_end: usize| ends.get(from_end).copied().unwrap_or(0.0);
         kernel(at - node as f64)
             + beyond(node) * kernel(at + 1.0)
             + beyond(nodes - 1 - node) * kernel(at - nodes as f64)

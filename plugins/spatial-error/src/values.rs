@@ -149,7 +149,7 @@ pub(crate) fn of_curves(found: &ComponentFit) -> Vec<NamedValue> {
         (
             "volumetric_rms",
             found.volumetric.before,
-            "root mean square length of the error over the measured volume, in the frame of the axes",
+            "root mean square length of the error over the measured volume, less the rigid motion that fits best",
         ),
         (
             "volumetric_rms_after",

@@ -9,7 +9,7 @@ use nalgebra::DVector;
 
 use super::{
     Basis, ComponentFit, Unseen, Whole, lost, named,
-    volumetric::{Projection, model_rows, root_mean_square},
+    volumetric::{Projection, root_mean_square},
 };
 use crate::{campaign::Campaign, solve::Solution};
 
@@ -19,7 +19,7 @@ pub(super) const ANGLES: [&str; 3] = ["EC0Y", "EB0Z", "EA0Z"];
 /// Root mean square length of the error over the measured volume, with its standard uncertainty, in µm.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Volumetric {
-    /// Of the machine, in the frame of its axes.
+    /// Of the machine, less the rigid motion that fits best.
     pub before: [f64; 2],
     /// After compensation by the curves.
     pub after: [f64; 2],
@@ -54,12 +54,10 @@ pub(super) fn evaluate(
         [mean, variance.max(0.0).sqrt()]
     };
     let values: Vec<[f64; 2]> = (0..combinations.len()).map(value).collect();
-    let left = projection.left();
-    let model = model_rows(basis, &fitted.measured, places) * &by_places;
+    let (left, before) = (projection.left(), projection.rigid()?.left());
     let total = whole.mean_um.len();
     let own = Mat::<f64>::identity(total, total);
     let after_mean = apply(&left, &whole.mean_um);
-    let before = &left + &model;
     let volumetric = Volumetric {
         before: root_mean_square(&apply(&before, &whole.mean_um), &before, &whole.covariance, places.len()),
         after: root_mean_square(&after_mean, &own, &whole.covariance, places.len()),

@@ -39,6 +39,10 @@ impl Projection {
         let design = Mat::from_fn(count * fitted.measured.len(), terms.len(), |row, column| {
             terms[column].at(&basis.volume, places[row % count], 0.0)[fitted.measured[row / count]]
         });
+        Self::of(terms, design)
+    }
+
+    fn of(terms: Vec<Term>, design: Mat<f64>) -> Option<Self> {
         let normal = design.transpose() * &design;
         let scale = DVector::from_fn(terms.len(), |at, _| normal[(at, at)].max(f64::MIN_POSITIVE).sqrt());
         let scaled = DMatrix::from_fn(terms.len(), terms.len(), |row, column| {
@@ -58,6 +62,14 @@ impl Projection {
         Some(Self { terms, design, inverse })
     }
 
+    /// On the placement alone.
+    pub(super) fn rigid(&self) -> Option<Self> {
+        let is_placement = |column: &usize| matches!(self.terms[*column], Term::Shift(_) | Term::Turn(_));
+        let columns: Vec<usize> = (0..self.terms.len()).filter(is_placement).collect();
+        let design = Mat::from_fn(self.design.nrows(), columns.len(), |row, at| self.design[(row, columns[at])]);
+        Self::of(columns.iter().map(|column| self.terms[*column]).collect(), design)
+    }
+
     /// Place of each column among others.
     pub(super) fn columns_of(&self, all: &[Term]) -> Vec<Option<usize>> {
         self.terms.iter().map(|term| all.iter().position(|other| linear(*other) == Some(*term))).collect()
@@ -70,30 +82,6 @@ impl Projection {
             f64::from(u8::from(row == column)) - taken[(row, column)]
         })
     }
-}
-
-/// What one unit of each value adds to the error at places, in the frame of the axes: nodes with their arms, then squareness errors.
-pub(super) fn model_rows(basis: &Basis, measured: &[usize], places: &[[f64; 3]]) -> Mat<f64> {
-    let mut columns: Vec<Vec<[f64; 3]>> = Vec::new();
-    for axis in 0..3 {
-        for error in 0..6 {
-            let (rotates, along, nodes) = (error >= 3, error % 3, basis.counts[axis]);
-            for node in 0..nodes {
-                let term = Term::Node { rotates, along, axis, node, nodes, between: Between::Linear };
-                columns.push(places.iter().map(|place| term.at(&basis.volume, *place, 0.0)).collect());
-            }
-        }
-    }
-    // EC0Y moves x by −y, EB0Z moves x by z, EA0Z moves y by −z.
-    for (moved, with, sign) in [(0, 1, -1.0), (0, 2, 1.0), (1, 2, -1.0)] {
-        let of =
-            |place: &[f64; 3]| Term::Squareness(moved, with).at(&basis.volume, *place, 0.0).map(|adds| sign * adds);
-        columns.push(places.iter().map(of).collect());
-    }
-    let count = places.len();
-    Mat::from_fn(count * measured.len(), columns.len(), |row, column| {
-        columns[column][row % count][measured[row / count]]
-    })
 }
 
 /// Root mean square length of errors B·e at places, e with a covariance, and its standard uncertainty: mean and variance of a quadratic

@@ -1,0 +1,106 @@
+//! From tables to a file.
+
+use std::path::PathBuf;
+
+use runout_core::{
+    Error, ErrorKind, Result,
+    atomic_file::PendingFile,
+    component_curves::{CURVES, ComponentCurves},
+    stage::{Completed, Export, Exporter, ResultInfo, Takes},
+    table::{RecordBatch, TableSpec},
+};
+
+use crate::{chain::Chain, config::ControllerConfig, dialects::dialect, header::header};
+
+/// The exporter `controller`.
+pub(crate) struct Controller {
+    pub path: PathBuf,
+    pub config: ControllerConfig,
+}
+
+struct Pending {
+    place: PendingFile,
+    object: String,
+    config: ControllerConfig,
+    curves: ComponentCurves,
+}
+
+impl Exporter for Controller {
+    fn takes(&self) -> Takes {
+        Takes::Tables
+    }
+
+    fn outputs(&self, _tables: &[TableSpec]) -> Vec<PathBuf> {
+        vec![self.path.clone()]
+    }
+
+    fn begin(&self, result: &ResultInfo) -> Result<Box<dyn Export>> {
+        let object = self.path.display().to_string();
+        if !result.tables.iter().any(|table| table.name == CURVES) {
+            let error =
+                Error::new("write", object, format!("the result has no table `{CURVES}`")).of(ErrorKind::Configuration);
+            return Err(
+                error.help("add `curves = { pitch_mm = [...] }` (rotary-axis: `{ pitch_deg = ... }`) to `[separate]`")
+            );
+        }
+        let place = PendingFile::new(&self.path)?;
+        Ok(Box::new(Pending { place, object, config: self.config.clone(), curves: ComponentCurves::default() }))
+    }
+}
+
+impl Pending {
+    fn refuse(&self, problem: String) -> Error {
+        Error::new("write", self.object.clone(), problem).of(ErrorKind::UnsuitableData)
+    }
+
+    fn text(&self, result: &Completed) -> Result<String> {
+        if self.curves.nodes.is_empty() {
+            return Err(self.refuse("the result has no component curves; its warnings say why".into()));
+        }
+        let whole = Chain::new(&self.curves).map_err(|problem| self.refuse(problem))?;
+        let all = whole.errors();
+        let is_known = |symbol: &String| all.contains(symbol) || whole.unknown.contains(symbol);
+        if let Some(unknown) = self.config.leave_out.iter().find(|symbol| !is_known(symbol)) {
+            let problem = format!("`leave_out` names {unknown}, and the result has {}", all.join(", "));
+            return Err(self.refuse(problem));
+        }
+        let dialect = dialect(&self.config);
+        let too_much: Vec<&str> = (all.iter())
+            .filter(|symbol| !self.config.leave_out.contains(symbol) && !dialect.holds(symbol))
+            .map(String::as_str)
+            .collect();
+        if !too_much.is_empty() {
+            let problem = format!("a file of {} cannot hold {}", self.config.dialect.name(), too_much.join(", "));
+            let names: Vec<String> = too_much.iter().map(|symbol| format!("\"{symbol}\"")).collect();
+            let help = format!("name what it shall leave: `leave_out = [{}]`", names.join(", "));
+            return Err(self.refuse(problem).help(help));
+        }
+        let kept = whole.without(&self.config.leave_out);
+        let written = dialect.write(&kept).map_err(|problem| self.refuse(problem))?;
+        let said = header(&self.config, &*dialect, &whole, &kept, written.notes, result);
+        let said: Vec<String> = said.iter().map(|line| format!("{} {line}", dialect.comment())).collect();
+        let lines = written.lines;
+        let all = if dialect.comments_last() { [lines, said] } else { interleaved(lines, said) };
+        Ok(all.concat().join("\n") + "\n")
+    }
+}
+
+/// The header goes first, but below a line that names the file (`%…`).
+fn interleaved(mut lines: Vec<String>, mut said: Vec<String>) -> [Vec<String>; 2] {
+    if lines.first().is_some_and(|line| line.starts_with('%')) {
+        said.insert(0, lines.remove(0));
+    }
+    [said, lines]
+}
+
+impl Export for Pending {
+    fn rows(&mut self, table: &TableSpec, rows: &RecordBatch) -> Result<()> {
+        self.curves.take(&table.name, rows)
+    }
+
+    fn finish(self: Box<Self>, result: &Completed) -> Result<Vec<PendingFile>> {
+        let text = self.text(result)?;
+        self.place.write(text.as_bytes())?;
+        Ok(vec![self.place])
+    }
+}
