@@ -30,20 +30,17 @@ impl Exporter for Controller {
         Takes::Tables
     }
 
+    fn needs(&self) -> Option<(&'static str, &'static str)> {
+        Some((CURVES, "add `curves = { pitch_mm = [...] }` (rotary-axis: `{ pitch_deg = ... }`) to `[separate]`"))
+    }
+
     fn outputs(&self, _tables: &[TableSpec]) -> Vec<PathBuf> {
         vec![self.path.clone()]
     }
 
-    fn begin(&self, result: &ResultInfo) -> Result<Box<dyn Export>> {
-        let object = self.path.display().to_string();
-        if !result.tables.iter().any(|table| table.name == CURVES) {
-            let error =
-                Error::new("write", object, format!("the result has no table `{CURVES}`")).of(ErrorKind::Configuration);
-            return Err(
-                error.help("add `curves = { pitch_mm = [...] }` (rotary-axis: `{ pitch_deg = ... }`) to `[separate]`")
-            );
-        }
+    fn begin(&self, _result: &ResultInfo) -> Result<Box<dyn Export>> {
         let place = PendingFile::new(&self.path)?;
+        let object = self.path.display().to_string();
         Ok(Box::new(Pending { place, object, config: self.config.clone(), curves: ComponentCurves::default() }))
     }
 }

@@ -197,9 +197,11 @@ fn mistakes_are_refused() {
     assert!(fault("dialect = \"linuxcnc\"").contains("needs `axis`"));
     assert!(fault("dialect = \"siemens-cec\"").contains("needs `positive_moves`"));
     assert!(fault("dialect = \"klipper\"").contains("needs `bed_z_mm`"));
-    // A result without curves.
-    let without: Vec<TableSpec> = specs.iter().filter(|spec| spec.name != "component_curves").cloned().collect();
-    let few = Outcome { tables: outcome.tables[..1].to_vec(), ..Outcome::default() };
-    let error = of_outcome("dialect = \"isg-csv\"", &without, &few).unwrap_err();
-    assert!(error.to_string().contains("no table `component_curves`") && error.advice().unwrap().contains("curves ="));
+    let exporter = support::exporter("plugin = \"controller\"\npath = \"a.txt\"\ndialect = \"isg-csv\"", folder.path());
+    let (needed, help) = exporter.unwrap().needs().unwrap();
+    assert!(needed == "component_curves" && help.contains("curves ="));
+    // A result with an empty table, and one with nodes between places.
+    let none = Outcome { tables: vec![outcome.tables[0].clone()], ..Outcome::default() };
+    let error = of_outcome("dialect = \"isg-csv\"", &specs, &none).unwrap_err();
+    assert!(error.to_string().contains("no component curves"), "{error}");
 }

@@ -6,7 +6,7 @@
 use runout_core::component_curves::symbols;
 
 use super::{
-    Dialect, Written,
+    Dialect, Written, fixed,
     isg::{errors, location, notes},
 };
 use crate::{chain::Chain, config::ControllerConfig};
@@ -25,14 +25,14 @@ impl Dialect for Etalon {
     fn write(&self, chain: &Chain) -> Result<Written, String> {
         let mut lines = Vec::new();
         for (name, value) in location(chain) {
-            lines.extend([format!("[{name}]"), format!("VALUE = {value:.12}"), String::new()]);
+            lines.extend([format!("[{name}]"), format!("VALUE = {}", fixed(value, 12)), String::new()]);
         }
         for axis in &chain.axes {
             for (error, symbol) in symbols(&axis.letter).into_iter().enumerate() {
                 lines.extend([format!("[{symbol}]"), "Gridpoints = {".to_owned()]);
                 for node in 0..axis.nodes.len() {
                     let value = errors(chain, axis, node, self.0.arms_from_mm)[error];
-                    lines.push(format!("{:.6} {value:.12}", axis.nodes[node].position));
+                    lines.push(format!("{} {}", fixed(axis.nodes[node].position, 6), fixed(value, 12)));
                 }
                 lines.extend([format!("}} // end of {symbol}"), String::new()]);
             }

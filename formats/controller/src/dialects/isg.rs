@@ -5,7 +5,7 @@
 
 use runout_core::component_curves::symbols;
 
-use super::{Dialect, Written};
+use super::{Dialect, Written, fixed};
 use crate::{
     chain::{AxisCurves, Chain, cross, index},
     config::ControllerConfig,
@@ -61,7 +61,7 @@ impl Dialect for IsgCsv {
         let location = location(chain);
         if !location.is_empty() {
             lines.push(location.iter().map(|(name, _)| name.clone()).collect::<Vec<_>>().join(" "));
-            lines.push(location.iter().map(|(_, value)| format!("{value:.12}")).collect::<Vec<_>>().join(" "));
+            lines.push(location.iter().map(|(_, value)| fixed(*value, 12)).collect::<Vec<_>>().join(" "));
         }
         for axis in &chain.axes {
             if !lines.is_empty() {
@@ -70,8 +70,8 @@ impl Dialect for IsgCsv {
             lines.push(format!("{} {}", axis.letter, symbols(&axis.letter).join(" ")));
             for node in 0..axis.nodes.len() {
                 let errors = errors(chain, axis, node, self.0.arms_from_mm);
-                let numbers: Vec<String> = errors.iter().map(|value| format!("{value:.12}")).collect();
-                lines.push(format!("{:.6} {}", axis.nodes[node].position, numbers.join(" ")));
+                let numbers: Vec<String> = errors.iter().map(|value| fixed(*value, 12)).collect();
+                lines.push(format!("{} {}", fixed(axis.nodes[node].position, 6), numbers.join(" ")));
             }
         }
         Ok(Written { lines, notes: notes(&self.0) })

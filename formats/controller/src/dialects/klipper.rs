@@ -4,7 +4,7 @@
 //! points with `mesh_x_pps` and `mesh_y_pps` 0. `axis_twist_compensation` is not written: it changes what a probe reads, not where the
 //! nozzle goes, and the mesh holds what a twist does on the bed.
 
-use super::{Dialect, Written};
+use super::{Dialect, Written, fixed};
 use crate::{
     chain::{AxisCurves, Chain, SQUARENESS},
     config::ControllerConfig,
@@ -44,12 +44,12 @@ impl Dialect for Klipper {
             .collect();
         let [x, y] = axes(chain)?;
         let mut lines = vec!["[skew_correction]".to_owned(), String::new(), "[skew_correction runout]".to_owned()];
-        lines.extend(skew.iter().map(|(name, factor)| format!("{name}_skew = {factor:.9}")));
+        lines.extend(skew.iter().map(|(name, factor)| format!("{name}_skew = {}", fixed(*factor, 9))));
         let ([min_x, max_x], [min_y, max_y]) = (x.ends(), y.ends());
         lines.extend([String::new(), "[bed_mesh runout]".into(), "version = 1".into(), "points =".into()]);
         for along_y in &y.nodes {
             let z = |along_x: &runout_core::component_curves::Node| {
-                format!("{:.6}", -1e-3 * self.bed_um(chain, along_x.position, along_y.position))
+                fixed(-1e-3 * self.bed_um(chain, along_x.position, along_y.position), 6)
             };
             lines.push(format!("    {}", x.nodes.iter().map(z).collect::<Vec<_>>().join(", ")));
         }

@@ -3,7 +3,7 @@
 //! Its source (`src/emc/motion/usrmotintf.cc`, `motion.h`): lines of nominal, forward and reverse position, nominal ascending, at most 256;
 //! the joint moves by nominal less forward (reverse). Reading stops at the first other line.
 
-use super::{Dialect, Written, few_enough, positions};
+use super::{Dialect, Written, few_enough, fixed, positions};
 use crate::{
     chain::{Chain, index},
     config::ControllerConfig,
@@ -38,7 +38,7 @@ impl Dialect for Linuxcnc {
         let axis = self.axis();
         let points = positions(&self.0, chain, axis).ok_or_else(|| format!("there is no curve of the axis {axis}"))?;
         few_enough(points.len(), self.0.most_points.unwrap_or(MOST_POINTS).min(MOST_POINTS), axis)?;
-        let row = |[at, error]: &[f64; 2]| format!("{at:.6} {:.6} {:.6}", at + error, at + error);
+        let row = |[at, error]: &[f64; 2]| [*at, at + error, at + error].map(|number| fixed(number, 6)).join(" ");
         let notes = vec![
             "COMP_FILE_TYPE = 0: nominal, forward and reverse position, in mm or °, of a machine in these units".to_owned(),
             "forward and reverse are equal: the curves do not tell directions apart; BACKLASH is ignored beside COMP_FILE".to_owned(),

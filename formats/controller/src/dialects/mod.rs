@@ -75,3 +75,12 @@ pub(crate) fn few_enough(found: usize, most: usize, of: &str) -> Result<(), Stri
     }
     Err(format!("{of} has {found} points, and the control takes {most}: take a wider pitch of the component curves"))
 }
+
+/// A number with digits behind the point; 0 without a sign.
+pub(crate) fn fixed(value: f64, digits: usize) -> String {
+    let text = format!("{value:.digits$}");
+    match text.strip_prefix('-') {
+        Some(rest) if rest.bytes().all(|letter| matches!(letter, b'0' | b'.')) => rest.to_owned(),
+        _ => text,
+    }
+}

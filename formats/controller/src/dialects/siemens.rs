@@ -5,7 +5,7 @@
 
 use runout_core::component_curves::{Carries, symbols};
 
-use super::{Dialect, Written, few_enough, positioning, positions};
+use super::{Dialect, Written, few_enough, fixed, positioning, positions};
 use crate::{
     chain::{Chain, SQUARENESS, index},
     config::{ControllerConfig, Moves},
@@ -41,7 +41,8 @@ impl Dialect for EncComp {
             let own = name(&self.0, &axis.letter);
             let points = positions(&self.0, chain, &axis.letter).unwrap_or_default();
             few_enough(points.len(), most, &axis.letter)?;
-            let value = |(point, [_, value]): (usize, &[f64; 2])| format!("$AA_ENC_COMP[0,{point},{own}]={value:.6}");
+            let value =
+                |(point, [_, value]): (usize, &[f64; 2])| format!("$AA_ENC_COMP[0,{point},{own}]={}", fixed(*value, 6));
             lines.extend(points.iter().enumerate().map(value));
             let [from, to] = axis.ends();
             lines.push(format!("$AA_ENC_COMP_STEP[0,{own}]={:.6}", axis.step()));
@@ -131,7 +132,7 @@ impl Dialect for Cec {
             let (input, output) = (name(&self.0, table.input), name(&self.0, table.output));
             let of = format!("the table of {input} on {output}");
             few_enough(table.wanted_mm.len(), self.0.most_points.unwrap_or(MOST_POINTS), &of)?;
-            let value = |(point, wanted): (usize, &f64)| format!("$AN_CEC[{at},{point}]={:.6}", sign * wanted);
+            let value = |(point, wanted): (usize, &f64)| format!("$AN_CEC[{at},{point}]={}", fixed(sign * wanted, 6));
             lines.extend(table.wanted_mm.iter().enumerate().map(value));
             let [from, to] = axis.ends();
             lines.push(format!("$AN_CEC_INPUT_AXIS[{at}]=({input})"));
