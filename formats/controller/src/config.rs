@@ -1,19 +1,9 @@
 //! `[[export]] plugin = "controller"`.
 
-use std::{
-    collections::BTreeMap,
-    path::{Path, PathBuf},
-};
+use std::{collections::BTreeMap, path::PathBuf};
 
-use runout_core::{
-    fault::Fault,
-    pipeline::{Context, StageConfig},
-    stage::Exporter,
-};
 use schemars::JsonSchema;
 use serde::Deserialize;
-
-use crate::export::Controller;
 
 /// `[[export]] plugin = "controller"`.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
@@ -91,39 +81,4 @@ pub enum Moves {
     Positive,
     /// In its negative direction.
     Negative,
-}
-
-impl StageConfig for ControllerConfig {
-    type Stage = Box<dyn Exporter>;
-
-    const NAME: &'static str = "controller";
-    const ABOUT: &'static str = "compensation file of a machine control, from component curves";
-
-    fn check(self, context: &Context) -> Result<Self::Stage, Fault> {
-        let needs = |key: &str, missing: bool, dialect: DialectName, what: &str| {
-            let message = format!("the dialect `{}` needs `{key}`, {what}", dialect.name());
-            if missing && self.dialect == dialect { Err(Fault::at("dialect", message)) } else { Ok(()) }
-        };
-        needs("axis", self.axis.is_none(), DialectName::Linuxcnc, "the axis of the file: `axis = \"X\"`")?;
-        needs(
-            "positive_moves",
-            self.positive_moves.is_none(),
-            DialectName::SiemensCec,
-            "where a positive value moves the axis: \"positive\" or \"negative\"",
-        )?;
-        needs(
-            "bed_z_mm",
-            self.bed_z_mm.is_none(),
-            DialectName::Klipper,
-            "the height of the bed in machine coordinates",
-        )?;
-        if let Some(points) = self.most_points.filter(|points| *points < 2) {
-            return Err(Fault::at("most_points", format!("a table has at least 2 points, found {points}")));
-        }
-        let is_file = Path::new(&self.path).file_name().is_some();
-        if !is_file {
-            return Err(Fault::at("path", "expected a file"));
-        }
-        Ok(Box::new(Controller { path: context.path(&self.path), config: self }))
-    }
 }
