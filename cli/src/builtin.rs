@@ -33,6 +33,7 @@ pub fn registry() -> Registry {
         runout_figures::register,
         runout_report::register,
         runout_values::register,
+        runout_controller::register,
     ] {
         register(&mut registry);
     }

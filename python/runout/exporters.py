@@ -223,3 +223,46 @@ class QDas:
 
     time: Union[str, None] = None
     """When it was measured (K0004), as `28.11.2026/14:30:00`."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Controller:
+    """Compensation file of a machine control, from component curves"""
+
+    plugin: ClassVar[str] = "controller"
+
+    arms_from_mm: Union[Sequence[float], None] = None
+    """isg-csv, etalon: the point of the machine from which the control counts lever arms, in mm."""
+
+    axes: Union[Mapping[str, Any], None] = None
+    """Names of the axes at the control: `{ X = "X1", Y = "Y1" }`; their letters without it."""
+
+    axis: Union[str, None] = None
+    """The axis of the file (linuxcnc: one file a joint)."""
+
+    bed_z_mm: Union[float, None] = None
+    """klipper: height of the bed at which its mesh is computed, in mm."""
+
+    dialect: Union[Literal['siemens-enc-comp'], Literal['siemens-cec'], Literal['isg-csv'], Literal['etalon'], Literal['linuxcnc'], Literal['klipper']]
+    """Whose file it is."""
+
+    first_table: Union[int, None] = None
+    """siemens-cec: index of the first table. Default: 0."""
+
+    leave_out: Union[Sequence[str], None] = None
+    """Errors that the file shall not hold: `["EAX", "EC0Y"]`. What the dialect cannot hold has to be named here."""
+
+    most_points: Union[int, None] = None
+    """Points of a table that the control has memory for; more are an error."""
+
+    most_tables: Union[int, None] = None
+    """siemens-cec: tables that the control has."""
+
+    path: str
+    """The file to write."""
+
+    positive_moves: Union[Union[Literal['positive'], Literal['negative']], None] = None
+    """siemens-cec: where a positive value of the table moves the axis. Write one table by hand and look: manuals differ."""
+
+    zero_at: Union[Mapping[str, Any], None] = None
+    """Position of each axis where its positioning correction is 0, in mm or °: that of its reference point. `{ X = 0.0 }`."""

@@ -219,6 +219,9 @@ class RotaryAxis:
     component_errors: Union[bool, None] = None
     """Whether component errors are free at each command; `false` declares that there are none. Default: true."""
 
+    curves: Union[Mapping[str, Any], None] = None
+    """Component errors at evenly spaced nodes, and location errors, as tables."""
+
     std_um: Union[float, None] = None
     """Standard uncertainty of one coordinate of one row, in µm. A column `std_um` overrides it; without both the scatter of
     repeats is taken."""
@@ -349,6 +352,9 @@ class SpatialError:
 
     compensate: Union[Mapping[str, Any], None] = None
     """How to compensate: by X, Y and Z without limits where nothing is said."""
+
+    curves: Union[Mapping[str, Any], None] = None
+    """Component errors of the axes at nodes, as tables: for a machine whose `chain` is known."""
 
     declared: Union[Sequence[Union[Literal['rigid'], Literal['translation']]], None] = None
     """What is always fitted: `rigid` (placement of the tracker: three displacements, three rotations), `translation` (ordinary

@@ -20,6 +20,7 @@
 
 pub mod answer;
 pub mod atomic_file;
+pub mod component_curves;
 pub mod effects;
 pub mod length_unit;
 pub mod pipeline;

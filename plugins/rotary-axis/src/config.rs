@@ -30,6 +30,17 @@ pub struct RotaryAxisConfig {
     /// Further points of the table for which the compensation is given.
     #[serde(default)]
     pub tool_points: Vec<Ball>,
+    /// Component errors at evenly spaced nodes, and location errors, as tables.
+    #[serde(default)]
+    pub curves: Option<Curves>,
+}
+
+/// Nodes of the component curves.
+#[derive(Debug, Clone, Copy, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Curves {
+    /// Distance of the nodes, in °: the turn, or the range of the commands, is divided evenly, as near to it as possible.
+    pub pitch_deg: f64,
 }
 
 fn default_component_errors() -> bool {
@@ -82,6 +93,12 @@ impl RotaryAxisConfig {
     pub fn separator(self) -> Result<RotaryAxis, Fault> {
         if let Some(std) = self.std_um.filter(|std| !(std.is_finite() && *std > 0.0)) {
             return Err(Fault::at("std_um", format!("the uncertainty must be above 0 µm, found {std}")));
+        }
+        if let Some(Curves { pitch_deg }) = self.curves
+            && !(0.01..=180.0).contains(&pitch_deg)
+        {
+            let fault = Fault::at("pitch_deg", format!("distances of nodes are from 0.01 to 180°, found {pitch_deg}"));
+            return Err(fault.under("curves"));
         }
         if self.balls.is_empty() {
             return Err(Fault::at("balls", "expected at least one ball"));

@@ -10,6 +10,7 @@ mod bias;
 mod campaign;
 mod config;
 mod consistency;
+mod curves;
 mod diagnose;
 mod effects;
 mod kinematics;
@@ -34,7 +35,7 @@ use runout_core::{
 };
 
 pub use axis::Axis;
-pub use config::{Ball, RotaryAxis, RotaryAxisConfig};
+pub use config::{Ball, Curves, RotaryAxis, RotaryAxisConfig};
 pub use model::{RTest, RTestConfig};
 pub use paper::{CircleFitConfig, ThreePointConfig};
 

@@ -63,8 +63,14 @@ pub struct ThreePointConfig {
 const SINGULAR: f64 = 1e-3;
 
 fn common(axis: Axis, balls: &[Ball], std_um: Option<f64>) -> std::result::Result<RotaryAxisConfig, Fault> {
-    let config =
-        RotaryAxisConfig { axis, balls: balls.to_vec(), std_um, component_errors: true, tool_points: Vec::new() };
+    let config = RotaryAxisConfig {
+        axis,
+        balls: balls.to_vec(),
+        std_um,
+        component_errors: true,
+        tool_points: Vec::new(),
+        curves: None,
+    };
     config.separator().map(|checked| checked.0)
 }
 

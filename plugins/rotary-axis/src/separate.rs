@@ -3,6 +3,7 @@
 use nalgebra::Vector3;
 use runout_core::{
     Error, ErrorKind, Result,
+    component_curves::location_table,
     consistency::refuted_by,
     points::{PointColumn, Points},
     stage::{
@@ -17,6 +18,7 @@ use crate::{
     campaign::{Campaign, columns},
     config::RotaryAxis,
     consistency::{checks, closing_errors},
+    curves,
     diagnose::typical_um,
     left_out::left_out,
     motion::axis_motion,
@@ -57,7 +59,11 @@ impl PointSeparator for RotaryAxis {
     }
 
     fn tables(&self) -> Vec<TableSpec> {
-        vec![component_table(self.0.axis), compensation_table(self.0.axis), residual_table("um")]
+        let mut all = vec![component_table(self.0.axis), compensation_table(self.0.axis), residual_table("um")];
+        if self.0.curves.is_some() {
+            all.extend([curves::table(), location_table()]);
+        }
+        all
     }
 
     fn separate(&self, points: &Points) -> Result<Outcome> {
@@ -217,11 +223,15 @@ impl RotaryAxis {
             let one = widened(of);
             [unit * one.value, unit * one.std].map(|number| number.is_finite().then_some(number))
         };
-        let tables = vec![
+        let mut tables = vec![
             self.component_rows(campaign, &sized)?,
             self.compensation_rows(campaign, &left_out, &sized)?,
             residual_rows(axis, campaign, if before.is_empty() { &found.residual } else { before }, &found.residual)?,
         ];
+        if let Some(curves) = self.0.curves {
+            tables.push(curves::rows(axis, curves, campaign, &found, &others, &scale)?);
+            tables.push(curves::location(&values, axis)?);
+        }
         let [first, second] = ["offsets", "tilts"];
         let convention = format!(
             "deviations are actual less nominal places of the balls in machine coordinates; the axis turns right-handed about \

@@ -40,10 +40,21 @@ pub struct SpatialErrorConfig {
     /// How to compensate: by X, Y and Z without limits where nothing is said.
     #[serde(default)]
     pub compensate: Compensate,
+    /// Component errors of the axes at nodes, as tables: for a machine whose `chain` is known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub curves: Option<Curves>,
     /// Standard uncertainty of one coordinate of one row, in µm. Without it: of the column `std_um`, else from repeats, else the
     /// nugget is noise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub std_um: Option<f64>,
+}
+
+/// Nodes of the component curves.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Curves {
+    /// Distance of the nodes of X, Y and Z, in mm: the measured travel is divided evenly, as near to it as possible.
+    pub pitch_mm: [f64; 3],
 }
 
 impl Default for SpatialErrorConfig {
@@ -56,6 +67,7 @@ impl Default for SpatialErrorConfig {
             chain: xyz(),
             query: Query::default(),
             compensate: Compensate::default(),
+            curves: None,
             std_um: None,
         }
     }
@@ -279,6 +291,11 @@ impl SpatialErrorConfig {
         }
         if let Some(std_um) = self.std_um.filter(|std_um| !(std_um.is_finite() && *std_um > 0.0)) {
             return Err(Fault::at("std_um", format!("the uncertainty must be above 0 µm, found {std_um}")));
+        }
+        let pitch_mm = self.curves.map_or([1.0; 3], |curves| curves.pitch_mm);
+        if let Some(pitch) = pitch_mm.iter().find(|pitch| !(pitch.is_finite() && **pitch > 0.0)) {
+            let fault = Fault::at("pitch_mm", format!("distances of nodes are above 0 mm, found {pitch}"));
+            return Err(fault.under("curves"));
         }
         self.query.check().map_err(|fault| fault.under("query"))?;
         self.compensate.chain(self, context).map_err(|fault| fault.under("compensate"))

@@ -4,8 +4,10 @@
 //! of the prediction follow from the Cholesky factors of the fields' covariance matrices (Rasmussen, Williams, *Gaussian Processes
 //! for Machine Learning* (2006), section 2.7; Chilès, Delfiner, *Geostatistics* (2012), section 3.4).
 
+mod posterior;
 mod predict;
 
+pub(crate) use posterior::Posterior;
 pub(crate) use predict::at_measured;
 pub use predict::{Predicted, Predictor, Query};
 

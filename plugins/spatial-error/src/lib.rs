@@ -10,6 +10,7 @@ mod compensate;
 mod conclusion;
 mod config;
 mod correlation;
+mod curves;
 mod diagnose;
 mod effects;
 mod families;
@@ -42,7 +43,7 @@ mod variogram;
 
 use runout_core::pipeline::{Plugin, Registry};
 
-pub use config::{Compensate, Declared, Kriging, Letter, SpatialError, SpatialErrorConfig, Variogram};
+pub use config::{Compensate, Curves, Declared, Kriging, Letter, SpatialError, SpatialErrorConfig, Variogram};
 pub use query::Query;
 
 /// Predictions from points with a covariance that is known, without a pipeline.

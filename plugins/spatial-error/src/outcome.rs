@@ -2,6 +2,7 @@
 
 use runout_core::{
     Result,
+    component_curves::{curves_rows, curves_table, location_rows, location_table},
     stage::Outcome,
     table::{ArrayRef, ColumnSpec, Figure, Measure, TableRows, TableSpec, counts, flags, numbers},
 };
@@ -11,9 +12,11 @@ use crate::{
     checks::{checks, factors},
     compensate::{Chain, Correction},
     conclusion::{At, Conclusion},
+    curves::component_fit,
     joint::{LeftOut, Predicted},
     remarks,
     residual::residual_um,
+    values::of_curves,
     variogram,
 };
 
@@ -22,9 +25,12 @@ const SMALL: f64 = 0.1;
 /// A standard deviation above this share of the prior's is an extrapolation.
 const UNCERTAIN: f64 = 0.8;
 
+const ABOUT_CURVES: &str = "component errors of the axes at nodes, linear between; positioning and rotations have mean 0, straightness the \
+                            least-squares line, over the nodes; rotations act on what the axis carries, with arms from the point `at`";
+
 /// The tables of the result.
 #[must_use]
-pub(crate) fn tables(chain: &Chain) -> Vec<TableSpec> {
+pub(crate) fn tables(chain: &Chain, curves: bool) -> Vec<TableSpec> {
     let of = |name: &str, unit: &str, about: &str| ColumnSpec::number(name, unit, about);
     let places = || ["x", "y", "z"].map(|axis| of(&format!("{axis}_mm"), "mm", "command").repeating());
     let each = |before: &str, about: &str| COMPONENTS.map(|one| of(&format!("{before}{one}_um"), "um", about));
@@ -53,12 +59,16 @@ pub(crate) fn tables(chain: &Chain) -> Vec<TableSpec> {
     compensation.push(extrapolated());
     let prediction = TableSpec::new("prediction", "predicted readings; NaN where nothing is predicted", prediction);
     let residual = TableSpec::new("residual", "residual of each reading", residual);
-    vec![
+    let mut all = vec![
         prediction.figure(error_map()),
         COMPONENTS.into_iter().fold(residual, |table, one| table.figure(before_and_after(one))).figure(left_out()),
         variogram::table(),
         TableSpec::new("compensation", "corrections, without the placement of the tracker", compensation),
-    ]
+    ];
+    if curves {
+        all.extend([curves_table(false, ABOUT_CURVES), location_table()]);
+    }
+    all
 }
 
 /// The error of the machine at the places of the query, as vectors.
@@ -93,27 +103,45 @@ impl Conclusion<'_> {
         let checks = checks(self.campaign, self.solution, &self.separator.config.kriging);
         let queries = self.queries(&places, factors(&checks));
         let left_out = self.solution.left_out();
-        let tables = vec![
+        let mut tables = vec![
             self.rows("prediction", prediction_columns(&queries))?,
             self.rows("residual", self.residual_columns(&left_out))?,
             self.rows("variogram", variogram::columns(self.campaign, self.solution))?,
             self.rows("compensation", self.compensation_columns(&queries))?,
         ];
+        let mut values = self.values(&queries, &left_out, &checks);
+        let mut remarks = remarks::remarks(self, &queries, &left_out);
+        let mut notes = remarks::notes(self, &queries);
+        if self.separator.config.curves.is_some() {
+            match component_fit(self.campaign, self.solution, &self.separator.config, factors(&checks)) {
+                Ok(found) => {
+                    tables.push(curves_rows(&curves_table(false, ABOUT_CURVES), &found.nodes)?);
+                    tables.push(location_rows(&found.location)?);
+                    values.extend(of_curves(&found));
+                    notes.extend(found.notes);
+                }
+                Err(problem) => {
+                    tables.push(curves_rows(&curves_table(false, ABOUT_CURVES), &[])?);
+                    tables.push(location_rows(&[])?);
+                    remarks.push(problem);
+                }
+            }
+        }
         Ok(Outcome {
             convention: "errors are actual less commanded place along the machine's axes; rotations are right-handed; lever arms and \
                          orders count from the middle of the measured volume"
                 .into(),
             tables,
-            values: self.values(&queries, &left_out, &checks),
+            values,
             checks,
-            remarks: remarks::remarks(self, &queries, &left_out),
-            notes: remarks::notes(self, &queries),
+            remarks,
+            notes,
             ..Outcome::default()
         })
     }
 
     fn rows(&self, name: &str, columns: Vec<ArrayRef>) -> Result<TableRows> {
-        let spec = tables(&self.separator.chain).into_iter().find(|spec| spec.name == name);
+        let spec = tables(&self.separator.chain, false).into_iter().find(|spec| spec.name == name);
         let spec = spec.unwrap_or_else(|| TableSpec::new(name, "", Vec::new()));
         Ok(TableRows { rows: spec.rows(columns)?, table: spec.name })
     }

@@ -46,7 +46,7 @@ impl PointSeparator for SpatialError {
     }
 
     fn tables(&self) -> Vec<TableSpec> {
-        tables(&self.chain)
+        tables(&self.chain, self.config.curves.is_some())
     }
 
     fn separate(&self, points: &Points) -> Result<Outcome> {

@@ -30,6 +30,8 @@ pub enum Term {
     Linear { moved: usize, axis: usize, order: usize },
     /// Rotation about `about` as an axis moves: a Legendre polynomial, µrad.
     Angular { about: usize, axis: usize, order: usize },
+    /// Displacement along `along` (µm), or rotation about it (µrad), at one of evenly spaced nodes of an axis: 1 there, 0 at the others.
+    Node { rotates: bool, along: usize, axis: usize, node: usize, nodes: usize, between: Between },
     /// Drift along an axis from the first reading to the last, µm.
     Drift(usize),
     /// Bend of a drift: its course at half time less half its change, µm.
@@ -44,6 +46,36 @@ pub enum Term {
     Step { moved: usize, axis: usize, at_mm: f64 },
     /// Displacement along `moved` within a box at a corner, µm; `above` says at which end of each axis.
     Corner { moved: usize, limit_mm: [f64; 3], above: [bool; 3] },
+}
+
+/// What a curve is between its nodes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Between {
+    /// Linear, as controls interpolate.
+    Linear,
+    /// Cubic convolution, exact for parabolas (Keys, IEEE Trans. Acoust. Speech Signal Process. 29 (1981) 1153).
+    Cubic,
+}
+
+impl Between {
+    /// Share of a node of several at a place, counted in nodes.
+    fn size(self, at: f64, node: usize, nodes: usize) -> f64 {
+        let linear = |from: f64| (1.0 - from.abs()).max(0.0);
+        if self == Self::Linear || nodes < 3 {
+            return linear(at - node as f64);
+        }
+        let kernel = |from: f64| match from.abs() {
+            from if from < 1.0 => (1.5 * from - 2.5) * from * from + 1.0,
+            from if from < 2.0 => ((-0.5 * from + 2.5) * from - 4.0) * from + 2.0,
+            _ => 0.0,
+        };
+        // A node before the first one, and one after the last, continues the polynomial of four nodes, or three.
+        let ends: &[f64] = if nodes > 3 { &[4.0, -6.0, 4.0, -1.0] } else { &[3.0, -3.0, 1.0] };
+        let beyond = |from_end: usize| ends.get(from_end).copied().unwrap_or(0.0);
+        kernel(at - node as f64)
+            + beyond(node) * kernel(at + 1.0)
+            + beyond(nodes - 1 - node) * kernel(at - nodes as f64)
+    }
 }
 
 impl Volume {
@@ -89,6 +121,13 @@ impl Term {
                 let size = legendre(order, volume.unit(axis, place));
                 return turned(about, volume.arm(axis, place)).map(|entry| size * entry);
             }
+            Self::Node { rotates, along, axis, node, nodes, between } => {
+                let size = between.size(0.5 * (volume.unit(axis, place) + 1.0) * (nodes - 1) as f64, node, nodes);
+                if rotates {
+                    return turned(along, volume.arm(axis, place)).map(|entry| size * entry);
+                }
+                adds[along] = size;
+            }
             Self::Drift(axis) => adds[axis] = time,
             Self::Bend(axis) => adds[axis] = 4.0 * time * (1.0 - time),
             Self::Pitch { axis, period_mm, cosine } => {
@@ -130,7 +169,7 @@ impl Term {
     #[must_use]
     pub fn unit(self) -> &'static str {
         match self {
-            Self::Turn(_) | Self::Squareness(..) | Self::Angular { .. } => "urad",
+            Self::Turn(_) | Self::Squareness(..) | Self::Angular { .. } | Self::Node { rotates: true, .. } => "urad",
             Self::Scale(_) => "um/m",
             Self::PitchSlope { .. } => "1",
             _ => "um",
@@ -159,4 +198,22 @@ pub(crate) fn legendre(order: usize, u: f64) -> f64 {
         (before, last) = (last, ((2.0 * n + 1.0) * u * last - n * before) / (n + 1.0));
     }
     last
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nodes_reproduce_parabolas_and_lines() {
+        let of = |between: Between, at: f64, value: &dyn Fn(f64) -> f64| -> f64 {
+            (0..5).map(|node| value(f64::from(node)) * between.size(at, node as usize, 5)).sum()
+        };
+        for step in 0..=40 {
+            let at = 0.1 * f64::from(step);
+            let parabola = |x: f64| 2.0 - x + 0.7 * x * x;
+            assert!((of(Between::Cubic, at, &parabola) - parabola(at)).abs() < 1e-12, "{at}");
+            assert!((of(Between::Linear, at, &|x| 3.0 - x) - (3.0 - at)).abs() < 1e-12, "{at}");
+        }
+    }
 }

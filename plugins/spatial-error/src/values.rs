@@ -8,6 +8,7 @@ use runout_core::{
 use crate::{
     campaign::COMPONENTS,
     conclusion::{At, Conclusion},
+    curves::ComponentFit,
     joint::LeftOut,
     likelihood::PARAMETERS,
     noise::Noise,
@@ -136,4 +137,33 @@ fn of_compensation(queries: &[At]) -> [NamedValue; 2] {
             "the same after the corrections: what axes cannot take away, what is not smooth, and what is not known of the prediction",
         ),
     ]
+}
+
+/// Squareness errors, and the error over the measured volume before and after compensation by the curves.
+pub(crate) fn of_curves(found: &ComponentFit) -> Vec<NamedValue> {
+    let of_location = found.location.iter().map(|error| {
+        let about = "squareness error between the least-squares lines of two axes (ISO 230-1)";
+        NamedValue::new(&error.symbol, error.value, error.std, "urad", about)
+    });
+    let volumetric = [
+        (
+            "volumetric_rms",
+            found.volumetric.before,
+            "root mean square length of the error over the measured volume, less the rigid motion that fits best",
+        ),
+        (
+            "volumetric_rms_after",
+            found.volumetric.after,
+            "the same expected after compensation by the component curves: what no axis can take away, and what is not known",
+        ),
+        (
+            "volumetric_rms_beyond_axes",
+            found.volumetric.beyond,
+            "of these what no axis can take away: no chain of rigid bodies has this error",
+        ),
+    ];
+    let volumetric = volumetric
+        .into_iter()
+        .map(|(symbol, [value, std], about)| NamedValue::new(symbol, value, std, "um", about).key());
+    of_location.chain(volumetric).collect()
 }

@@ -15,6 +15,11 @@ pub trait Exporter: Send + Sync {
     /// What it writes.
     fn takes(&self) -> Takes;
 
+    /// A table without which it has nothing to write, and what to do so that the result has it.
+    fn needs(&self) -> Option<(&'static str, &'static str)> {
+        None
+    }
+
     /// The files that it writes of a result with these tables, so that two exporters do not write the same one. The first is
     /// always there, and `diagnosis.json` goes beside it where this is the first exporter.
     fn outputs(&self, tables: &[TableSpec]) -> Vec<PathBuf>;

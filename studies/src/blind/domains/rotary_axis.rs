@@ -84,6 +84,7 @@ fn draw(kind: Kind, turn: usize, chance: &mut Chance) -> Result<Campaign> {
         std_um,
         component_errors: true,
         tool_points: Vec::new(),
+        curves: None,
     };
     let separator = config.separator().map_err(|fault| Error::new("check", "the balls", fault))?;
     Ok(Campaign {

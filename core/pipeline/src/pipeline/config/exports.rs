@@ -90,6 +90,12 @@ impl Exporting<'_> {
                 let fault = Fault::at("plugin", message);
                 return Err(document::resolve(fault.help("take one that writes tables"), table));
             }
+            if let Some((needed, help)) = exporter.needs()
+                && !self.tables.iter().any(|table| table.name == needed)
+            {
+                let message = format!("this exporter takes the table `{needed}`; [separate] does not give it");
+                return Err(document::resolve(Fault::at("plugin", message).help(help), table));
+            }
             taken
                 .add(&*exporter, "written by an exporter", &[(SUMMARY, SUMMARY_USE)])
                 .map_err(|fault| document::resolve(fault, table))?;
