@@ -13,6 +13,8 @@ use crate::check::{Check, Test};
 const WITHIN_A_TURN: f64 = 0.5;
 /// Rows on either side of those in which it may step at least: of fewer, place and size are one guess.
 const FEWEST_BESIDE: usize = 3;
+/// Root mean square over the turns of a phase below which it is that of interpolation between samples, in rad.
+const LEAST_RAD: f64 = 1e-7;
 /// Rounds in which a phase is taken out and what is left of it is looked for: each leaves the cube of what the one before left.
 const ROUNDS: usize = 6;
 /// The test of the phase.
@@ -55,7 +57,10 @@ fn look_at_phase(table: &TurnTable, linear: Option<Shared>, course: &mut Course)
     ];
     let settled = tried.map(|tried| tried.and_then(|(phase, count)| settled(phase, count, table)));
     course.run = settled[0].map(|(phase, _)| phase);
-    let settled = settled.into_iter().flatten().min_by(|a, b| a.1.p.total_cmp(&b.1.p));
+    let is_there = |shared: &Shared| shared.by.abs() * shared.share(table.rows()) > LEAST_RAD;
+    let linear = linear.filter(is_there);
+    let settled = settled.into_iter().flatten().filter(|(_, shared)| is_there(shared));
+    let settled = settled.min_by(|a, b| a.1.p.total_cmp(&b.1.p));
     // What turns against the mark by order 1 is said already.
     let is_said = course.phase_std_rad > 0.0;
     let shared = settled.map(|(_, shared)| shared).filter(Shared::refutes).or(linear);
