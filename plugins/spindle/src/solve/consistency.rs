@@ -27,8 +27,8 @@ const CLASSES: f64 = (SMOOTHING + 1) as f64;
 /// Turns from which single orders are judged: with fewer, most frequencies between two orders are neighbours, and a tone of asynchronous motion
 /// next to a whole order cannot be distinguished from it.
 const FEWEST_TURNS: usize = 8;
-/// Share of the noise of all orders below which what one order has more refutes no value: it is named, and is in the uncertainty of that order. A
-/// tone of asynchronous motion at a whole order, to a part of a period over the recording, is no more.
+/// Share of the noise of all orders below which what one of the many higher orders has more refutes no value: it is named, and is in the uncertainty of
+/// that order. A tone of asynchronous motion at a whole order, to a part of a period over the recording, is no more.
 const LITTLE: f64 = 0.05;
 /// Degrees of freedom of the noise of all orders together, at most and at least: the few turns' scatter that weights are taken from biases it by
 /// some percent however many orders there are, and asynchronous motion of low frequency makes it scatter as from so few.
@@ -81,7 +81,8 @@ pub(super) fn judge(residual: &mut Residual, turns: &[usize], sensors: usize, or
         single.extend(above.map(|check| {
             let order = known.iter().find(|order| name(order) == check.of);
             let excess = order.map_or(f64::INFINITY, |order| (check.statistic - 1.0) * order.expected);
-            if excess < LITTLE * whole { check.named() } else { check }
+            let is_little = beside == SMOOTHING && excess < LITTLE * whole;
+            if is_little { check.named() } else { check }
         }));
     }
     // Of those that are as they should be, the least likely one is enough.
