@@ -132,7 +132,7 @@ pub fn station_with_spread(
             let trim = trim(recorded.saturating_sub(turns))?;
             averager.average_requested(trim.attach(Box::new(Inspection::new(stream)))?, wanted)
         };
-        Ok(recounted(average(&[])?, average))
+        Ok(recounted(average(&[])?, |_| true, average))
     };
     let profiles: Result<Vec<Profile>> = (0..rig.setups.len()).map(profile).collect();
     let truth = recording.truth(station)?.unwrap_or_default();

@@ -3,7 +3,7 @@
 use runout_core::{
     effects::EffectEntry,
     fault::known_names,
-    pipeline::{Catalogue, Registry, plain_tables},
+    pipeline::{Catalogue, Registry, plain_tables, put_right},
 };
 use serde::Serialize;
 use serde_json::{Map, Value, json};
@@ -70,7 +70,11 @@ pub(crate) fn entries(registry: &Registry) -> Vec<Entry> {
         name: effect.name,
         about: effect.about,
         schema: values(effect),
-        place: "[diagnose] effects, values in known".into(),
+        place: if put_right::IDS.contains(&effect.name) {
+            "[diagnose] effects; the recording is put right".into()
+        } else {
+            "[diagnose] effects, values in known".into()
+        },
     }));
     entries.extend(plain_tables().into_iter().map(|table| Entry {
         stage: TABLE,

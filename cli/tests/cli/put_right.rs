@@ -75,6 +75,22 @@ fn marks_that_do_not_count_the_turns_are_put_right() {
     assert!(held * 100 >= 80 * compared, "{held} of {compared}");
 }
 
+/// A list of effects leaves out the mistakes that it does not name, and no mistake is of known size.
+#[test]
+fn only_what_is_listed_is_put_right() {
+    let folder = campaign(2, "[[effect]]\nplugin = 'turn-ratio'\ntargets = ['b']\nturning_deg = 0.2\n");
+    for (listed, verdict, added) in [("turn-ratio", "explained", 1), ("lost-samples", "unexplained", 0)] {
+        let effects = format!("diagnose.effects=['{listed}']");
+        let diagnosis = document(&folder, &["diagnose", "pipeline.toml", "--set", &effects]);
+        assert_eq!(diagnosis["verdict"], verdict, "{listed}");
+        assert_eq!(diagnosis["added"].as_array().unwrap().len(), added, "{listed}: {}", diagnosis["added"]);
+    }
+    let known = "diagnose.known=[{ effect = 'turn-ratio', target = 'b', values = { turning = 0.2 } }]";
+    let refused = folder.run(&["diagnose", "pipeline.toml", "--set", known]);
+    assert_eq!(refused.status, 2, "{}", refused.stderr);
+    assert!(refused.stderr.contains("turns_per_mark"), "{}", refused.stderr);
+}
+
 /// A mark in every second turn of the part.
 #[test]
 fn a_mark_in_two_turns_is_put_right() {

@@ -80,7 +80,7 @@ pub fn diagnosed(pipeline: &Pipeline, threads: Option<NonZeroUsize>, observer: &
                 hold_out,
                 projections: projections(pipeline, &**separator, rig),
                 alone: false,
-                puts_marks_right: put_right::marks::are_looked_for(&pipeline.diagnose.settings),
+                puts_right: Some(&pipeline.diagnose.settings),
             };
             diagnose_turns(pipeline, &line, threads, (&**separator, &**model), observer)
         }

@@ -16,6 +16,7 @@ use super::{
     read_ahead::{Captures, read_ahead, read_along, work_behind},
 };
 use crate::stage::{AverageRequest, Averager, Conditioner, Station, StationSeparator};
+use runout_closed_loop::closed_loop::Settings;
 use runout_consistency::turns::PhaseCourse;
 use runout_error::{Error, ErrorKind, Result};
 use runout_numerics::threads;
@@ -43,8 +44,8 @@ pub(crate) struct RecordReader<'a> {
     pub hold_out: Option<f64>,
     /// How motion follows from the readings of each setup, where the spread over the turns is wanted.
     pub projections: Vec<Option<Projection>>,
-    /// Whether turns are counted by the marks that they show, where those recorded do not count them.
-    pub puts_marks_right: bool,
+    /// What turns are counted anew for, where the recorded marks do not count them; nothing where they are taken as they are.
+    pub puts_right: Option<&'a Settings>,
     /// Whether one thread does all: the others have recordings of their own.
     pub alone: bool,
 }
@@ -174,8 +175,9 @@ impl RecordReader<'_> {
                 let mut profile = self.averager.average_requested(stream, wanted)?;
                 let spikes = std::mem::take(&mut *spikes.lock().unwrap_or_else(PoisonError::into_inner));
                 profile.warnings.extend(unusual(&spikes, &capture, &profile));
-                if self.puts_marks_right {
-                    profile = put_right::marks::recounted(profile, |by| {
+                if let Some(settings) = self.puts_right {
+                    let is_wanted = |phase: &PhaseCourse| put_right::marks::is_wanted(phase, settings);
+                    profile = put_right::marks::recounted(profile, is_wanted, |by| {
                         let spikes = Mutex::default();
                         let stream = self.recorded(NonZeroUsize::MIN, index, setup, by, &spikes)?;
                         self.averager.average_requested(stream, wanted)

@@ -104,7 +104,7 @@ fn run_turns(
         averager,
         hold_out: None,
         projections: projections(pipeline, separator, rig),
-        puts_marks_right: false,
+        puts_right: None,
         alone,
     };
     let (radius_mm, stations) = (rig.part_radius_mm, recording.stations().len());

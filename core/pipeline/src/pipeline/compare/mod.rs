@@ -129,7 +129,7 @@ impl<'a> Comparing<'a> {
             averager: self.averager,
             hold_out: None,
             projections: Vec::new(),
-            puts_marks_right: false,
+            puts_right: None,
             alone: false,
         };
         let work = |index, station: Station| self.station(&station, recording.truth(index)?.as_ref());

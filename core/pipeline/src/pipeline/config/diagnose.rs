@@ -204,6 +204,15 @@ fn exists<'a>(id: &str, ids: impl Iterator<Item = &'a str>) -> Result<(), Fault>
 
 impl KnownEffect {
     fn setting(&self, effects: &[Effect]) -> Result<Setting, Fault> {
+        if put_right::IDS.contains(&self.effect.as_str()) {
+            let fault = Fault::at(
+                "effect",
+                format!("`{}` is a mistake of the recording, which `diagnose` puts right", self.effect),
+            );
+            return Err(fault.help(
+                "leave it out of `known`; a mark that is not once a turn is declared by `turns_per_mark` of the setup",
+            ));
+        }
         exists(&self.effect, ids(effects)).map_err(|fault| fault.under("effect"))?;
         let of_this_id = || effects.iter().enumerate().filter(|(_, effect)| effect.id == self.effect);
         let at = |targets: &[String]| if targets.is_empty() { "none".into() } else { targets.join(" ") };

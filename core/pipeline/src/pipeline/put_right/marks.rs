@@ -29,22 +29,26 @@ const ALIKE_STD: f64 = 5.0;
 /// Turns from mark to mark are written with so many significant digits.
 const DIGITS: usize = 9;
 
-/// Whether marks may be put right.
+/// Whether marks may be put right that show a phase.
 #[must_use]
-pub fn are_looked_for(settings: &Settings) -> bool {
-    [TURN_RATIO, LOST_SAMPLES].iter().any(|id| is_looked_for(id, settings))
+pub fn is_wanted(phase: &PhaseCourse, settings: &Settings) -> bool {
+    is_looked_for(if is_run(phase) { TURN_RATIO } else { LOST_SAMPLES }, settings)
 }
 
 /// A profile by marks that count the part's turns; the profile itself where its own do, or where others leave as much. `again` averages the same
-/// capture by marks [put right](runout_turning::counted_turns::counted) by each phase after the other.
-pub fn recounted(profile: Profile, again: impl Fn(&[PhaseCourse]) -> Result<Profile>) -> Profile {
+/// capture by marks [put right](runout_turning::counted_turns::counted) by each phase after the other, of those that are `wanted`.
+pub fn recounted(
+    profile: Profile,
+    wanted: impl Fn(&PhaseCourse) -> bool,
+    again: impl Fn(&[PhaseCourse]) -> Result<Profile>,
+) -> Profile {
     let (mut by, mut best, mut is_settled) = (Vec::new(), None::<Profile>, false);
     for _ in 0..MOST {
         let course = &best.as_ref().unwrap_or(&profile).course;
         // Turns that are counted wrongly mix orders: with them counted nearly right, the run is known better.
         let rest =
             course.run.filter(|_| !is_settled && by.last().is_some_and(|last| is_run(last) && last.std_rad > 0.0));
-        let Some(phase) = course.phase.or(rest) else { break };
+        let Some(phase) = course.phase.or(rest).filter(&wanted) else { break };
         is_settled = course.phase.is_none();
         let tried = together(&by, phase);
         let is_left =
