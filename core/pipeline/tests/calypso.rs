@@ -4,9 +4,7 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
-#[path = "../../../tests/support/measured_data.rs"]
-mod measured_data;
-
+use crate::measured_data;
 use std::{
     f64::consts::TAU,
     fs::File,

@@ -2,10 +2,13 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
-mod support;
-
+use crate::support;
 use std::path::Path;
 
+use crate::support::{
+    controls::{Cec, EncComp, Klipper, Volumetric, between, linuxcnc},
+    left_out, left_um, number_after, of_outcome,
+};
 use nalgebra::Vector3;
 use runout_core::{
     pipeline::Context,
@@ -15,10 +18,6 @@ use runout_core::{
 use runout_spatial_error::{
     SpatialErrorConfig,
     simulate::{Layout, Placement, Scenario, Simulated, SimulatedEffect, Tracker},
-};
-use support::{
-    controls::{Cec, EncComp, Klipper, Volumetric, between, linuxcnc},
-    left_out, left_um, number_after, of_outcome,
 };
 
 const ENDS_MM: [f64; 3] = [500.0, 400.0, 300.0];

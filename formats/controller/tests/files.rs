@@ -2,20 +2,18 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
-mod support;
-
 use std::{env, fs, path::Path};
 
+use crate::support::{
+    controls::{Cec, EncComp, Klipper, Volumetric, between, linuxcnc},
+    of_curves, of_outcome,
+};
 use nalgebra::{Rotation3, Vector3};
 use runout_core::{
     component_curves::{Carries, ComponentCurves, Location, Node},
     stage::PointSeparator,
 };
 use runout_rotary_axis::{RotaryAxisConfig, simulate::Scenario};
-use support::{
-    controls::{Cec, EncComp, Klipper, Volumetric, between, linuxcnc},
-    of_curves, of_outcome,
-};
 
 const STD: [f64; 6] = [0.1, 0.1, 0.1, 1.0, 1.0, 1.0];
 

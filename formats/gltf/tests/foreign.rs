@@ -2,16 +2,13 @@
 
 #![allow(clippy::unwrap_used, reason = "tests")]
 
-#[path = "../../mesh/tests/support/mod.rs"]
-mod support;
-
 use std::{
     path::{Path, PathBuf},
     process::Command,
 };
 
+use crate::support::{closed, export, export_heights, exporter, heights, report, skip, surface, trimesh, volume_mm3};
 use runout_core::{pipeline::Registry, stage::Exporter};
-use support::{closed, export, export_heights, exporter, heights, report, skip, surface, trimesh, volume_mm3};
 
 fn gltf(folder: &Path, keys: &str) -> Box<dyn Exporter> {
     let mut registry = Registry::default();

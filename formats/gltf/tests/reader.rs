@@ -2,19 +2,16 @@
 
 #![allow(clippy::unwrap_used, clippy::float_cmp, reason = "tests; some numbers are exact by contract")]
 
-#[path = "../../mesh/tests/support/mod.rs"]
-mod support;
-
 use std::{
     collections::{HashMap, HashSet},
     path::Path,
 };
 
-use gltf::{Accessor, Gltf, Semantic};
-use runout_core::{pipeline::Registry, stage::Takes, surface::Surface};
-use support::{
+use crate::support::{
     ANGLES, RADIUS_MM, angle, deviation_um, export, export_heights, exporter, heights, names, surface, volume_mm3,
 };
+use gltf::{Accessor, Gltf, Semantic};
+use runout_core::{pipeline::Registry, stage::Takes, surface::Surface};
 
 const RINGS: usize = 10;
 

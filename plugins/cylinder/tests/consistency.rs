@@ -2,13 +2,11 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
-mod simulator;
-
 use std::f64::consts::TAU;
 
+use crate::simulator::{Part, Recording, around};
 use runout_core::{Complex64, points::Points, separation::Separation};
 use runout_cylinder::{LeastSquaresCylinder, LeastSquaresCylinderConfig};
-use simulator::{Part, Recording, around};
 
 fn separator(radius_mm: f64, max_order: usize) -> LeastSquaresCylinder {
     let config = LeastSquaresCylinderConfig {

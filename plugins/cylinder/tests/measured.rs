@@ -3,12 +3,11 @@
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
 mod bad_data;
-#[path = "../../../tests/support/measured_data.rs"]
-mod measured_data;
-mod simulator;
 
+use crate::measured_data;
 use std::path::{Path, PathBuf};
 
+use crate::simulator::{Part, Recording};
 use nalgebra::{DMatrix, DVector};
 use runout_core::{
     model::{closed_loop, diagnosis::Diagnosis},
@@ -25,7 +24,6 @@ use runout_core::{
     surface::{Surface, SurfaceBuilder, SurfaceConfig},
 };
 use runout_cylinder::{LeastSquaresCylinder, LeastSquaresCylinderConfig};
-use simulator::{Part, Recording};
 
 /// The measured file, where it is.
 fn measured() -> Option<PathBuf> {

@@ -2,10 +2,9 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
-mod simulator;
-
 use std::{f64::consts::TAU, path::PathBuf};
 
+use crate::simulator::{Part, Recording, around};
 use runout_core::{
     model::diagnosis::Diagnosis,
     pipeline::{
@@ -18,7 +17,6 @@ use runout_core::{
     summary::Summary,
 };
 use runout_cylinder::{LeastSquaresCylinder, LeastSquaresCylinderConfig};
-use simulator::{Part, Recording, around};
 
 /// Points as a CSV file.
 fn csv(points: &Points) -> String {

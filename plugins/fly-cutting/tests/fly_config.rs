@@ -2,11 +2,9 @@
 
 #![allow(clippy::unwrap_used, reason = "tests")]
 
-mod common;
-
 use std::path::Path;
 
-use common::{CUT, scenario, separator};
+use crate::common::{CUT, scenario, separator};
 use runout_core::{
     pipeline::{Context, StageConfig},
     points::{Column, Points},

@@ -2,9 +2,8 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
-mod common;
-
-use common::{CUT, diagnose, listing, parameter, run, scenario, separator, value};
+use crate::common;
+use crate::common::{CUT, diagnose, listing, parameter, run, scenario, separator, value};
 use runout_core::{model::diagnosis::Verdict, points::Points};
 
 const SIDE: usize = 160;

@@ -2,9 +2,8 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
-mod common;
-
-use common::{of, scenario};
+use crate::common;
+use crate::common::{of, scenario};
 
 /// f²/8R and f²/8R·√(4/45) of a parabola, and of the circle that the nose is.
 #[test]
@@ -90,7 +89,7 @@ fn a_deep_pass_takes_away_its_neighbours() {
     }
 }
 
-/// 10 × 10 mm: `cargo test --release -p runout-fly-cutting --test fly_surface time -- --ignored --nocapture` prints the time over the number
+/// 10 × 10 mm: `cargo test --release -p runout-fly-cutting fly_surface::time -- --ignored --nocapture` prints the time over the number
 /// of points; `cargo bench` measures it well.
 #[test]
 #[ignore = "a measurement of time"]

@@ -2,9 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
-#[path = "../../../tests/support/measured_data.rs"]
-mod measured_data;
-
+use crate::measured_data;
 use std::{f64::consts::TAU, fmt::Write, path::PathBuf};
 
 use runout_core::{

@@ -2,9 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
-mod common;
-
-use common::{COMPONENTS, LOCATION, PLACEMENT, THREE_BALLS, scenario, separated, value};
+use crate::common::{COMPONENTS, LOCATION, PLACEMENT, THREE_BALLS, scenario, separated, value};
 
 /// A turn from −180° to 180° that does not close, or does: the end of the turn is no repeat of its beginning.
 #[test]

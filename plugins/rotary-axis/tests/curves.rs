@@ -2,9 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "tests")]
 
-mod common;
-
-use common::{COMPONENTS, LOCATION, PLACEMENT, THREE_BALLS, scenario, separated, separator};
+use crate::common::{COMPONENTS, LOCATION, PLACEMENT, THREE_BALLS, scenario, separated, separator};
 use runout_core::{
     component_curves::{Carries, ComponentCurves},
     stage::{Outcome, PointSeparator},

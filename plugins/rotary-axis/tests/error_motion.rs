@@ -2,11 +2,9 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
-mod common;
-
 use std::{fmt::Write, path::PathBuf};
 
-use common::{COMPONENTS, LOCATION, PLACEMENT, THREE_BALLS, scenario, separated, separator};
+use crate::common::{COMPONENTS, LOCATION, PLACEMENT, THREE_BALLS, scenario, separated, separator};
 use runout_core::{
     Complex64,
     numerics::statistics::NORMAL_95,

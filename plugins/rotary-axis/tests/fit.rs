@@ -2,9 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
-mod common;
-
-use common::{COMPONENTS, LOCATION, PLACEMENT, THREE_BALLS, column, scenario, separated, separator, value};
+use crate::common::{COMPONENTS, LOCATION, PLACEMENT, THREE_BALLS, column, scenario, separated, separator, value};
 use runout_core::{
     points::{Points, mistakes},
     stage::PointSeparator,

@@ -2,9 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
-mod common;
-
-use common::{COMPONENTS, LOCATION, PLACEMENT, THREE_BALLS, scenario, separator};
+use crate::common::{COMPONENTS, LOCATION, PLACEMENT, THREE_BALLS, scenario, separator};
 use runout_core::{
     model::{closed_loop::Settings, diagnosis::Verdict},
     stage::{PointDiagnosis, PointSeparator},

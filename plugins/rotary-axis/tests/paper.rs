@@ -2,9 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
-mod common;
-
-use common::{COMPONENTS, LOCATION, PLACEMENT, THREE_BALLS, column, scenario, separated, value};
+use crate::common::{COMPONENTS, LOCATION, PLACEMENT, THREE_BALLS, column, scenario, separated, value};
 use runout_core::{
     pipeline::{Context, StageConfig},
     points::Points,

@@ -2,9 +2,7 @@
 
 #![allow(clippy::print_stdout, reason = "tests")]
 
-mod common;
-
-use common::{COMPONENTS, LOCATION, PLACEMENT, THREE_BALLS, scenario, separated};
+use crate::common::{COMPONENTS, LOCATION, PLACEMENT, THREE_BALLS, scenario, separated};
 use runout_core::points::Points;
 
 /// A pass of one ball whose readings stand in reverse order, and passes of two balls that are exchanged.

@@ -2,11 +2,10 @@
 
 #![allow(clippy::unwrap_used, reason = "tests")]
 
-mod support;
-
+use crate::support;
 use std::{fs, path::Path};
 
-use support::{MATERIALS, loader, points, separator, solved};
+use crate::support::{MATERIALS, loader, points, separator, solved};
 
 const SHAFT: &str = r#"segments = [{ length_mm = 200, outer_mm = 50, material = "steel" }]"#;
 

@@ -2,12 +2,10 @@
 
 #![allow(clippy::unwrap_used, reason = "tests")]
 
-mod support;
-
 use std::f64::consts::PI;
 
+use crate::support::{equations, frequencies, modal, near, rad_per_s};
 use runout_rotor::{Mode, Search, Whirl, whirl};
-use support::{equations, frequencies, modal, near, rad_per_s};
 
 /// Bending stiffness E·I of a solid shaft of steel, in N·m².
 fn bending(diameter_mm: f64) -> f64 {

@@ -2,8 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::float_cmp, reason = "tests; orders and numbers of modes are whole")]
 
-mod support;
-
+use crate::support::{MATERIALS, modal, near, points, separator, solved};
 use arrow_array::{
     Array, RecordBatch,
     cast::AsArray,
@@ -11,7 +10,6 @@ use arrow_array::{
 };
 use runout_core::{points::Points, stage::Outcome};
 use std::{f64::consts::PI, path::Path};
-use support::{MATERIALS, modal, near, points, separator, solved};
 
 const ROTOR: &str = r#"segments = [{ length_mm = 600, outer_mm = 40, material = "steel", elements = 6 }]
     disks = [{ z_mm = 400, mass_kg = 12, polar_kg_m2 = 0.12, diametral_kg_m2 = 0.07 }]

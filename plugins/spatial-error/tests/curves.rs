@@ -2,8 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "tests")]
 
-mod support;
-
+use crate::support::{scenario, separator, value};
 use nalgebra::{DMatrix, DVector, Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -12,7 +11,6 @@ use runout_core::{
     stage::{Outcome, PointSeparator},
 };
 use runout_spatial_error::simulate::{Layout, Scenario, Simulated, SimulatedEffect};
-use support::{scenario, separator, value};
 
 /// The errors that the tests hide, with their orders.
 const HIDDEN: [(&str, u32, f64); 9] = [

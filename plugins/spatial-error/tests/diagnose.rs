@@ -2,8 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "tests")]
 
-mod support;
-
+use crate::support::{scenario, separator};
 use runout_core::{
     model::{
         Setting,
@@ -13,7 +12,6 @@ use runout_core::{
     stage::PointSeparator,
 };
 use runout_spatial_error::simulate::{Scenario, SimulatedEffect};
-use support::{scenario, separator};
 
 fn diagnose(scenario: &Scenario, text: &str) -> Diagnosis {
     let settings = Settings { max_added: 40, ..Settings::default() };

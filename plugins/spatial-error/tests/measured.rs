@@ -2,8 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "tests")]
 
-mod support;
-
+use crate::support::{column, scenario, separator, table, value};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
@@ -14,7 +13,6 @@ use runout_core::{
     stage::{Outcome, PointSeparator},
 };
 use runout_spatial_error::simulate::{Field, Layout, Scenario, Simulated};
-use support::{column, scenario, separator, table, value};
 
 fn change(points: &mut Points, name: &str, to: impl FnMut((usize, &mut f64))) {
     let column = points.columns.iter_mut().find(|column| column.name == name).unwrap();

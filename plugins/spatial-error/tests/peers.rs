@@ -8,16 +8,14 @@
     reason = "tests"
 )]
 
-mod support;
-
 use std::{path::PathBuf, process::Command};
 
+use crate::support::{column, readings, separator, table};
 use runout_core::{
     consistency::{Check, Test},
     stage::PointSeparator,
 };
 use serde_json::Value;
-use support::{column, readings, separator, table};
 
 fn assets(name: &str) -> PathBuf {
     PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/assets")).join(name)

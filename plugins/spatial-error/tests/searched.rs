@@ -2,8 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "tests")]
 
-mod support;
-
+use crate::support::{scenario, separator};
 use runout_core::{
     model::{
         closed_loop::Settings,
@@ -12,7 +11,6 @@ use runout_core::{
     stage::PointSeparator,
 };
 use runout_spatial_error::simulate::{Layout, Scenario, SimulatedEffect};
-use support::{scenario, separator};
 
 const COARSE: &str = "query = { grid_mm = [300, 200, 175] }\n";
 

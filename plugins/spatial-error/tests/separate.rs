@@ -2,11 +2,9 @@
 
 #![allow(clippy::unwrap_used, clippy::single_match_else, clippy::unnecessary_debug_formatting, reason = "tests")]
 
-mod support;
-
+use crate::support::{column, flags, points, readings, scenario, separator, table, try_separator, value};
 use runout_core::{points::Points, stage::PointSeparator};
 use runout_spatial_error::simulate::{Layout, Scenario};
-use support::{column, flags, points, readings, scenario, separator, table, try_separator, value};
 
 fn message(points: &Points, text: &str) -> String {
     let error = separator(text).separate(points).unwrap_err();

@@ -3,13 +3,11 @@
 #![allow(clippy::unwrap_used, clippy::panic, reason = "tests")]
 
 mod axial_campaigns;
-mod campaigns;
-mod common;
 
 use std::f64::consts::TAU;
 
-use campaigns::{averaged, campaign};
-use common::{Sum, profile, random_sum, value};
+use crate::campaigns::{averaged, campaign};
+use crate::common::{Sum, profile, random_sum, value};
 use runout_core::{
     Complex64,
     measurement::StationTruth,
@@ -142,7 +140,7 @@ impl Truth {
             form => &self.form_um[form.section().unwrap()],
         };
         let unknown = separation.position(quantity).unwrap();
-        let of = |order| common::coefficient_error(separation, unknown, order, truth);
+        let of = |order| crate::common::coefficient_error(separation, unknown, order, truth);
         (lowest..=25).map(of).fold(0.0, |largest, error| if error <= largest { largest } else { error })
     }
 }

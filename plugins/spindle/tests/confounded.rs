@@ -4,9 +4,7 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, clippy::panic, reason = "tests")]
 
-mod campaigns;
-
-use campaigns::{averaged, campaign};
+use crate::campaigns::{averaged, campaign};
 use runout_core::{
     Complex64,
     measurement::StationTruth,

@@ -3,14 +3,13 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, clippy::panic, reason = "tests")]
 
-mod campaigns;
 mod channels;
 mod profiles;
 mod turns;
 mod unexplained;
 mod wiring;
 
-use campaigns::{averaged, averaged_behind, campaign};
+use crate::campaigns::{averaged, averaged_behind, campaign};
 use runout_core::{
     Complex64,
     measurement::StationTruth,

@@ -2,8 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
-mod campaigns;
-
+use crate::campaigns;
 use std::time::Instant;
 
 use runout_core::{

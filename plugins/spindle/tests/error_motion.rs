@@ -2,13 +2,10 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, clippy::panic, reason = "tests")]
 
-mod campaigns;
-mod common;
-
 use std::{f64::consts::TAU, path::Path, time::Instant};
 
-use campaigns::campaign;
-use common::{FOUR_SENSORS, Sum, rig, value};
+use crate::campaigns::campaign;
+use crate::common::{FOUR_SENSORS, Sum, rig, value};
 use runout_core::{
     error_motion::{Centre, ErrorMotion},
     evaluate::Value,
@@ -267,7 +264,7 @@ fn motion_is_observable_along_the_one_direction_of_all_sensors() {
     assert_eq!(quantities, [Quantity::X, Quantity::Y, Quantity::TiltX, Quantity::TiltY]);
 }
 
-/// Not a test: what the spread costs beside the average. `cargo test -p runout-spindle --test error_motion -- --ignored
+/// Not a test: what the spread costs beside the average. `cargo test -p runout-spindle error_motion:: -- --ignored
 /// --nocapture`.
 #[test]
 #[ignore = "a measurement of time"]

@@ -3,11 +3,8 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, clippy::panic, reason = "tests")]
 
-mod campaigns;
-mod common;
-
-use campaigns::{averaged, campaign};
-use common::{FOUR_SENSORS, rig};
+use crate::campaigns::{averaged, campaign};
+use crate::common::{FOUR_SENSORS, rig};
 use runout_core::{
     model::{closed_loop::Settings, diagnosis::Diagnosis, foresight::Foresight},
     rig::Rig,

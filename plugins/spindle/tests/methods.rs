@@ -2,9 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
-mod common;
-
-use common::{FOUR_SENSORS, Sum, Truth, coefficient_error, disturb, linear_station, random_sum, rig};
+use crate::common::{FOUR_SENSORS, Sum, Truth, coefficient_error, disturb, linear_station, random_sum, rig};
 use runout_core::{
     Complex64,
     rig::{Rig, Rotation},

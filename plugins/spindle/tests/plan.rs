@@ -2,11 +2,9 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
-mod common;
-
 use std::{ops::RangeInclusive, time::Instant};
 
-use common::{FOUR_SENSORS, rig};
+use crate::common::{FOUR_SENSORS, rig};
 use proptest::prelude::*;
 use runout_core::{
     rig::Rig,

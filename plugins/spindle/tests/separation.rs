@@ -2,13 +2,11 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
-mod campaigns;
-mod common;
-
+use crate::common;
 use std::f64::consts::TAU;
 
-use campaigns::{averaged, campaign};
-use common::{FOUR_SENSORS, Truth, disturb, linear_station, random_sum, rig, value};
+use crate::campaigns::{averaged, campaign};
+use crate::common::{FOUR_SENSORS, Truth, disturb, linear_station, random_sum, rig, value};
 use runout_core::{
     Complex64,
     numerics::fourier::Fourier,

@@ -2,9 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, clippy::panic, reason = "tests")]
 
-mod campaigns;
-
-use campaigns::{averaged, averaged_from, campaign};
+use crate::campaigns::{averaged, averaged_from, campaign};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use runout_core::{

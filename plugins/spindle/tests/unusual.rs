@@ -2,9 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
-mod campaigns;
-
-use campaigns::{averaged, campaign, two_sections};
+use crate::campaigns::{averaged, campaign, two_sections};
 use runout_core::{
     model::{closed_loop::Settings, diagnosis::Verdict},
     rig::SetupConfig,

@@ -2,9 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
-mod common;
-
-use common::{Campaign, ground, rms};
+use crate::common::{Campaign, ground, rms};
 use runout_core::{
     consistency::{Check, Test},
     model::{closed_loop::Settings, diagnosis::Diagnosis},

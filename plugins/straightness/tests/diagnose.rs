@@ -2,9 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
-mod common;
-
-use common::{Campaign, Shot, ground, rms};
+use crate::common::{Campaign, Shot, ground, rms};
 use runout_core::model::{closed_loop::Settings, diagnosis::Diagnosis};
 use runout_straightness::{AxialReversal, AxialReversalConfig, Straightness};
 

@@ -2,14 +2,12 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
-mod support;
-
+use crate::support::{config, lobing, scenario, setups, value};
 use runout_core::{
     points::Points,
     stage::{Outcome, PointSeparator},
 };
 use runout_touch_probe::simulate::{TouchProbeScenario, Wave};
-use support::{config, lobing, scenario, setups, value};
 
 const LAYOUT: [(f64, f64); 3] = [(0.0, 0.0), (100.0, 0.0), (217.0, 0.0)];
 

@@ -2,8 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
-mod support;
-
+use crate::support::{config, scenario, setups};
 use runout_core::{
     model::{
         closed_loop::Settings,
@@ -12,7 +11,6 @@ use runout_core::{
     stage::{PointDiagnosis, PointSeparator},
 };
 use runout_touch_probe::simulate::{TouchProbeScenario, Wave};
-use support::{config, scenario, setups};
 
 /// The ring and the probe turned, each by angles of their own.
 const TURNED: [(f64, f64); 6] = [(0.0, 0.0), (100.0, 0.0), (217.0, 0.0), (0.0, 70.0), (140.0, 70.0), (40.0, 205.0)];

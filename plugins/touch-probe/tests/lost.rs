@@ -2,13 +2,12 @@
 
 #![allow(clippy::unwrap_used, reason = "tests")]
 
-mod support;
-
+use crate::support;
+use crate::support::{column, config, configuration, flags, lobing, scenario, setups, table, value};
 use runout_core::{
     points::Points,
     stage::{Outcome, PointSeparator},
 };
-use support::{column, config, configuration, flags, lobing, scenario, setups, table, value};
 
 fn refused(scenario: &runout_touch_probe::simulate::TouchProbeScenario, points: &Points) -> String {
     config(scenario, 6, Some(2.0)).separate(points).unwrap_err().to_string()

@@ -2,10 +2,9 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, clippy::items_after_statements, reason = "tests")]
 
-mod support;
-
+use crate::support;
+use crate::support::{column, config, lobing, scenario, setups, table, value};
 use runout_core::stage::PointSeparator;
-use support::{column, config, lobing, scenario, setups, table, value};
 
 /// Pre-travel, lobes, mean and ranges over many campaigns: three quarters of them with uneven directions.
 #[test]

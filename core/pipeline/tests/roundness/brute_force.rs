@@ -5,7 +5,7 @@ use runout_core::standards::{
     roundness::Points,
 };
 
-use crate::profiles::{Profile, profile};
+use super::profiles::{Profile, profile};
 
 type Place = [f64; 2];
 
@@ -110,7 +110,7 @@ fn plots_have_the_smallest_circle_and_no_better_one_than_all_subsets() {
     let mut wrong = Vec::new();
     let (mut best, mut all) = ([0; 2], [0; 2]);
     for seed in 0..400 {
-        let plot = crate::contact::plot(seed);
+        let plot = super::contact::plot(seed);
         let places: Vec<Place> = plot.places().into_iter().map(|(_, place)| place).collect();
         let points = plot.points();
         // Rounding relative to the plot's size, magnified by bisectors of points that lie near each other.

@@ -2,7 +2,7 @@
 
 use runout_core::standards::{reference::Reference, roundness::Circle};
 
-use crate::profiles::{Profile, profile};
+use super::profiles::{Profile, profile};
 
 /// Rounding of coordinates of 300 mm and of distances from them, in µm, with room.
 const TOLERANCE_UM: f64 = 2e-9;

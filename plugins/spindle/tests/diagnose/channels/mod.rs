@@ -3,7 +3,8 @@
 use runout_core::model::diagnosis::Verdict;
 use runout_spindle::simulate::SpindleConfig;
 
-use crate::{CLEAN_UM, campaigns::campaign, diagnosed};
+use super::{CLEAN_UM, diagnosed};
+use crate::campaigns::campaign;
 
 /// One effect: it is named by itself or in its set, with its size where it is alone, and form is no farther off than before.
 fn finds(effect: &str, named: &str, parameter: Option<(&str, f64)>) {

@@ -4,11 +4,8 @@
 use runout_core::model::{Effect, Fit, Model, Setting, diagnosis::Verdict};
 use runout_spindle::{diagnose::SpindleModel, effects, layout::Layout, selection::Selection, simulate::SpindleConfig};
 
-use crate::{
-    CLEAN_UM,
-    campaigns::{averaged, campaign, two_sections},
-    diagnosed,
-};
+use super::{CLEAN_UM, diagnosed};
+use crate::campaigns::{averaged, campaign, two_sections};
 
 fn six_sensors(seed: u64, effect: &str) -> SpindleConfig {
     let mut config = campaign(seed, effect);

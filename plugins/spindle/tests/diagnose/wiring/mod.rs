@@ -21,11 +21,8 @@ use runout_spindle::{
     simulate::SpindleConfig,
 };
 
-use super::{
-    CLEAN_UM,
-    campaigns::{averaged, campaign, two_sections},
-    diagnosed,
-};
+use super::{CLEAN_UM, diagnosed};
+use crate::campaigns::{averaged, campaign, two_sections};
 
 /// A campaign with three sensors in each of two sections: every mistake in one channel shows by itself.
 fn six(seed: u64, effects: &str) -> SpindleConfig {

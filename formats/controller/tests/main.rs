@@ -1,0 +1,6 @@
+//! Tests of this crate, in one program.
+#![allow(clippy::unwrap_used, reason = "tests")]
+
+mod control;
+mod files;
+mod support;

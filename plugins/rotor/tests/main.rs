@@ -1,0 +1,7 @@
+//! Tests of this crate, in one program.
+#![allow(clippy::unwrap_used, reason = "tests")]
+
+mod bad_input;
+mod closed_forms;
+mod support;
+mod tables;

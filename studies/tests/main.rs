@@ -1,0 +1,13 @@
+//! Tests of this crate, in one program.
+#![allow(clippy::unwrap_used, reason = "tests")]
+
+mod axial;
+mod blind;
+mod blind_points;
+mod coverage;
+mod eccentricity;
+mod minimum_zone_cylinder;
+mod rotor;
+mod spatial;
+mod straightness;
+mod values;
