@@ -50,7 +50,7 @@ impl<'a> Joint<'a> {
         let fine = Fourier::new(samples_per_rev * OVERSAMPLING);
         let place = |angle_rad: f64| {
             let (first, weights) = weights_at(fine.length(), angle_rad);
-            Place { first, weights }
+            Place { first: first % fine.length(), weights }
         };
         let straight = layout.readings.iter().flat_map(|reading| {
             (0..samples_per_rev).map(|step| layout.part_angle_rad(reading, step, samples_per_rev)).map(place)
@@ -149,11 +149,11 @@ impl<'a> Joint<'a> {
         let mut harmonics = vec![Complex64::ZERO; self.max_order + 1];
         for (unknown, section) in sections(self.layout) {
             let form = unknowns.iter().skip(unknown).step_by(width).map(|value| self.layout.of_part(*value));
-            let table = self.fine.synthesise(form);
+            let table = repeated(self.fine.synthesise(form));
             for (index, _) in seen(self.layout, section) {
                 for (step, value) in curve.iter_mut().enumerate() {
                     let [met, straight] = [&self.met, &self.straight].map(|places| places[index * samples + step]);
-                    *value = met.of(table) - straight.of(table);
+                    *value = met.of(&table) - straight.of(&table);
                 }
                 self.turn.analyse_in_place(&mut curve, &mut harmonics);
                 for (order, harmonic) in harmonics.iter().enumerate().skip(1) {
@@ -178,10 +178,12 @@ impl<'a> Joint<'a> {
         }
         let samples = self.turn.length();
         let mut forms = vec![Complex64::ZERO; (self.max_order + 1) * width];
-        let mut table = vec![0.0; self.fine.length()];
+        let length = self.fine.length();
+        let mut table = Vec::with_capacity(length + POINTS);
         let mut harmonics = vec![Complex64::ZERO; self.max_order + 1];
         for (unknown, section) in sections(self.layout) {
-            table.fill(0.0);
+            table.clear();
+            table.resize(length + POINTS, 0.0);
             for (index, _) in seen(self.layout, section) {
                 let own = (0..=self.max_order)
                     .map(|order| if order == 0 { Complex64::ZERO } else { readings[order * count + index].conj() });
@@ -192,7 +194,11 @@ impl<'a> Joint<'a> {
                     self.straight[index * samples + step].add(&mut table, -value);
                 }
             }
-            let half = 0.5 * table.len() as f64;
+            for point in (length..table.len()).rev() {
+                table[point - length] += table[point];
+            }
+            table.truncate(length);
+            let half = 0.5 * length as f64;
             self.fine.analyse_in_place(&mut table, &mut harmonics);
             for (order, harmonic) in harmonics.iter().enumerate().skip(2) {
                 forms[order * width + unknown] = self.layout.of_part(harmonic * half);
@@ -215,17 +221,22 @@ impl<'a> Joint<'a> {
 }
 
 impl Place {
+    /// The value here of a table that begins anew at its end ([`repeated`]).
     fn of(&self, table: &[f64]) -> f64 {
-        let length = table.len();
-        self.weights.iter().enumerate().map(|(point, weight)| weight * table[(self.first + point) % length]).sum()
+        let points = &table[self.first..self.first + POINTS];
+        self.weights.iter().zip(points).map(|(weight, point)| weight * point).sum()
     }
 
+    /// The adjoint of [`of`](Self::of).
     fn add(&self, table: &mut [f64], value: f64) {
-        let length = table.len();
-        for (point, weight) in self.weights.iter().enumerate() {
-            table[(self.first + point) % length] += weight * value;
-        }
+        let points = &mut table[self.first..self.first + POINTS];
+        self.weights.iter().zip(points).for_each(|(weight, point)| *point += weight * value);
     }
+}
+
+/// A table of one turn, and the first of its points again: no place runs over its end.
+fn repeated(turn: &[f64]) -> Vec<f64> {
+    turn.iter().cycle().take(turn.len() + POINTS).copied().collect()
 }
 
 /// Places of the forms among the unknowns, and their sections.
