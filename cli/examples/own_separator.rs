@@ -13,7 +13,7 @@ use runout_core::{
     pipeline::{Context, Pipeline, Plugin, Registry, StageConfig},
     points::{PointColumn, PointKind, Points},
     stage::{Outcome, PointSeparator, Separator},
-    summary::{NamedValue, Summary},
+    summary::{Summary, Value},
     table::{ColumnSpec, TableRows, TableSpec, numbers},
 };
 use schemars::JsonSchema;
@@ -78,13 +78,13 @@ impl PointSeparator for Plane {
             - distance.iter().fold(f64::INFINITY, |least, one| least.min(*one));
         let columns = [x.to_vec(), y.to_vec(), distance].map(numbers);
         let slope = |index: usize| (plane.coefficients[index], plane.covariance[(index, index)].sqrt());
-        let tilt = |axis: &str, (slope, std): (f64, f64)| -> NamedValue {
-            NamedValue::new("slope", slope, std, "um/mm", "slope of the least-squares plane").of(axis)
+        let tilt = |axis: &str, (slope, std): (f64, f64)| -> Value {
+            Value::new("slope", slope, std, "um/mm", "slope of the least-squares plane").of(axis)
         };
         let tables = vec![TableRows { table: "plane".into(), rows: residual().rows(columns.into())? }];
         // The range of noise is no uncertainty of a range: it has none here.
         let values = vec![
-            NamedValue::new("FLTt", range, f64::NAN, "um", "peak-to-valley flatness deviation LSPL (ISO 12781-1)"),
+            Value::new("FLTt", range, f64::NAN, "um", "peak-to-valley flatness deviation LSPL (ISO 12781-1)"),
             tilt("x", slope(1)),
             tilt("y", slope(2)),
         ];
@@ -117,7 +117,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let points = folder.join("points.csv");
     std::fs::write(&points, "x_mm,y_mm,z_um\n0,0,1.0\n10,0,2.1\n0,10,0.9\n10,10,2.0\n5,5,1.7\n")?;
     for value in flatness(&points, &folder.join("out"))?.values {
-        println!("{} {:?} ± {:?} {}", value.symbol, value.value, value.std, value.unit);
+        println!("{} {:?} ± {:?} {}", value.symbol, value.number(), value.std(), value.unit);
     }
     Ok(())
 }

@@ -38,10 +38,10 @@ fn an_own_separator_finds_a_plane() {
     fs::write(&file, "x_mm,y_mm,z_um\n0,0,1\n10,0,2\n0,10,1\n10,10,2\n5,5,1.9\n").unwrap();
     let summary = own_separator::flatness(&file, &folder.path().join("out")).unwrap();
     let [flatness, x, y] = &summary.values[..] else { panic!("{:?}", summary.values) };
-    assert!((flatness.value.unwrap() - 0.4).abs() < 1e-9 && flatness.std.is_none(), "{flatness:?}");
-    assert!((x.value.unwrap() - 0.1).abs() < 1e-12 && y.value.unwrap().abs() < 1e-12);
+    assert!((flatness.value - 0.4).abs() < 1e-9 && flatness.uncertainty.is_none(), "{flatness:?}");
+    assert!((x.value - 0.1).abs() < 1e-12 && y.value.abs() < 1e-12);
     // 0.1 µm on four points 5 mm from the middle: 0.1/√(4·25).
-    assert!((x.std.unwrap() - 0.01).abs() < 1e-12, "{x:?}");
+    assert!((x.std().unwrap() - 0.01).abs() < 1e-12, "{x:?}");
     assert!(folder.path().join("out/plane.parquet").exists());
 
     fs::write(&file, "x_mm,y_mm,z_um\n0,0,1\n1,1,2\n2,2,1\n").unwrap();

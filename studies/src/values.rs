@@ -182,7 +182,8 @@ pub(crate) fn count(found: &Summary, truth: &Summary, rows: &mut Rows) {
         let mut places: BTreeMap<String, Vec<Value>> = BTreeMap::new();
         for placed in summary.placed_values() {
             let value = placed.value;
-            let name = format!("{} | {} | {}", value.symbol, value.reference, value.filter);
+            let [reference, filter] = [&value.reference, &value.filter].map(|text| text.as_deref().unwrap_or_default());
+            let name = format!("{} | {reference} | {filter}", value.symbol);
             places.entry(name).or_default().push(value.clone());
         }
         places

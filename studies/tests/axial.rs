@@ -7,12 +7,12 @@ use runout_studies::{
     coverage::table,
 };
 
-/// 60 spindles a layout. Of 60 intervals that hold with 95 %, 51 or fewer do in 1 of 500 cases; errors at angles depend on each
+/// 40 spindles a layout. Of 40 intervals that hold with 95 %, 33 or fewer do in 1 of 300 cases; errors at angles depend on each
 /// other, 36 of a campaign.
 #[test]
 fn stated_intervals_of_axial_motion_hold_the_truth() {
     for layout in Layout::ALL {
-        let rows = rows(&layout.campaigns(0, 60)).unwrap();
+        let rows = rows(&layout.campaigns(0, 40)).unwrap();
         println!("{}\n{}", layout.name(), table(&rows));
         let names: Vec<&str> = rows.iter().map(|row| row.name.as_str()).collect();
         for symbol in [
@@ -26,7 +26,7 @@ fn stated_intervals_of_axial_motion_hold_the_truth() {
         }
         assert_eq!(names.contains(&"face at angles"), layout == Layout::Face);
         for row in &rows {
-            assert!(row.percent() >= 86.0, "{}: {}: {:.1} %", layout.name(), row.name, row.percent());
+            assert!(row.percent() >= 84.0, "{}: {}: {:.1} %", layout.name(), row.name, row.percent());
         }
     }
 }

@@ -5,7 +5,7 @@ use runout_studies::blind::{Kind, domains, points};
 #[test]
 fn what_is_wrong_is_named_and_nothing_else() {
     for domain in &domains::ALL {
-        let all = points::campaigns(domain, 20, 2).unwrap();
+        let all = points::campaigns(domain, 12, 2).unwrap();
         println!("{}\n\n{}", domain.name, points::report::report(&all));
         let mut visible = 0;
         for judged in &all {
@@ -17,6 +17,6 @@ fn what_is_wrong_is_named_and_nothing_else() {
         }
         // An effect may be near the limit: one miss at most.
         let missed = all.iter().filter(|judged| judged.kind != Kind::Clean && !judged.failures().is_empty()).count();
-        assert!(missed <= 1 && visible >= 6, "{}: {missed} missed, {visible} visible", domain.name);
+        assert!(missed <= 1 && visible >= 3, "{}: {missed} missed, {visible} visible", domain.name);
     }
 }

@@ -122,7 +122,14 @@ fn a_keyway_is_left_out_of_every_value_and_each_says_so() {
         assert_eq!((&one.symbol, &one.filter), (&other.symbol, &other.filter));
         assert!((other.coverage - coverage).abs() < 3e-3, "{}: {}", other.symbol, other.coverage);
         let uncertainty = one.uncertainty.as_ref().unwrap();
-        println!("{} {}: {:.4} and {:.4}, std {:.4}", one.symbol, one.filter, one.value, other.value, uncertainty.std);
+        println!(
+            "{} {}: {:.4} and {:.4}, std {:.4}",
+            one.symbol,
+            one.filter.as_deref().unwrap(),
+            one.value,
+            other.value,
+            uncertainty.std
+        );
         // The same readings but for the keyway: what bridging it changes is of the size of the uncertainty.
         let apart = (one.value - other.value).abs();
         assert!(apart < 3.0 * uncertainty.std + 0.01 * one.value, "{}: {} and {}", one.symbol, one.value, other.value);
@@ -205,7 +212,13 @@ fn a_keyway_between_samples_stays_where_it_is() {
             assert_eq!(one.no_uncertainty, other.no_uncertainty);
             let std = one.uncertainty.as_ref().map_or(0.0, |uncertainty| uncertainty.std);
             let apart = (one.value - other.value).abs();
-            println!("{name}, {} {}: {:.4} and {:.4}", one.symbol, one.filter, one.value, other.value);
+            println!(
+                "{name}, {} {}: {:.4} and {:.4}",
+                one.symbol,
+                one.filter.as_deref().unwrap(),
+                one.value,
+                other.value
+            );
             assert!(apart < std + 0.002 * one.value, "{}: {} and {}", one.symbol, one.value, other.value);
         }
     }

@@ -2,6 +2,7 @@
 
 use runout_core::{
     answer::Answer,
+    evaluate::ValueId,
     model::diagnosis::{Added, Blind, Diagnosis, Estimated, Level, Step},
     summary::Summary,
 };
@@ -143,11 +144,10 @@ fn changes(added: &[Added]) -> Vec<String> {
 fn moved(diagnosis: &Diagnosis) -> Table {
     let mut table = Table::new(2, ["", "section", "before", "after ± std"]);
     for one in &diagnosis.moved {
+        let (reference, filter) = (one.reference.as_deref(), one.filter.as_deref());
+        let id = ValueId { symbol: &one.value, reference, filter, band_upr: [0; 2], of: None };
         table.row([
-            match (&one.reference, &one.filter) {
-                (Some(reference), Some(filter)) => described(&one.value, reference, filter, &one.unit),
-                _ => format!("{} {}", one.value, unit(&one.unit)),
-            },
+            format!("{} {}", described(&id), unit(&one.unit)),
             one.section.clone().unwrap_or_default(),
             significant(one.before, 6),
             with_std(one.after, one.std) + &lacking(&one.lost_orders),

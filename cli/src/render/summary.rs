@@ -8,7 +8,7 @@ pub(super) mod values;
 use runout_core::{
     answer::Answer,
     draws::IntervalKind,
-    evaluate::Value,
+    evaluate::{Value, ValueId},
     summary::{CaptureSummary, SectionSummary, StationSummary, Summary},
 };
 
@@ -167,15 +167,16 @@ fn first_values(stations: &[StationSummary]) -> Vec<&Value> {
 
 /// "RONt LSCI, unfiltered µm": what a value is, with reference and filter.
 fn label(value: &Value) -> String {
-    described(&value.symbol, &value.reference, &value.filter, &value.unit)
+    format!("{} {}", described(&value.id()), unit(&value.unit))
 }
 
-/// The same of its parts.
-pub(super) fn described(symbol: &str, reference: &str, filter: &str, unit_id: &str) -> String {
+/// The same without the unit; of a domain's own value its symbol.
+pub(super) fn described(id: &ValueId) -> String {
+    let (Some(reference), Some(filter)) = (id.reference, id.filter) else { return id.symbol.to_owned() };
     // The mean line is the only one that there is for texture.
     let reference = if reference == "mean line" { String::new() } else { format!(" {reference}") };
     let filter = if filter == "none" { "unfiltered" } else { filter };
-    format!("{symbol}{reference}, {filter} {}", unit(unit_id))
+    format!("{}{reference}, {filter}", id.symbol)
 }
 
 fn sections(stations: &[StationSummary]) -> impl Iterator<Item = (&StationSummary, &SectionSummary)> {

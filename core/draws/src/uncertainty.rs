@@ -61,6 +61,12 @@ impl Uncertainty {
         Self { std, interval_95, draws, kind: IntervalKind::Coverage }
     }
 
+    /// Of a value whose error is normal.
+    #[must_use]
+    pub fn normal(value: f64, std: f64) -> Self {
+        Self::new(std, [value - NORMAL_95 * std, value + NORMAL_95 * std], 0)
+    }
+
     /// Of an amplitude, from the standard uncertainty of its part along the phasor, known from so many real degrees of
     /// freedom (0 where it is taken as exact). An amplitude that noise alone exceeds in more than [5 % of all
     /// cases](noise_95) may be noise: its interval begins at 0.

@@ -45,9 +45,9 @@ fn evaluated(motion: AxisMotion, text: &str) -> Evaluated {
 }
 
 fn find<'a>(found: &'a Evaluated, symbol: &str) -> &'a Value {
-    let known = || found.values.iter().map(|(_, value)| value.symbol.as_str()).collect::<Vec<_>>();
-    let value = found.values.iter().find(|(_, value)| value.symbol == symbol);
-    &value.unwrap_or_else(|| panic!("no {symbol} in {:?}", known())).1
+    let known = || found.values.iter().map(|value| value.symbol.as_str()).collect::<Vec<_>>();
+    let value = found.values.iter().find(|value| value.symbol == symbol);
+    value.unwrap_or_else(|| panic!("no {symbol} in {:?}", known()))
 }
 
 /// Highest less lowest on so many angles that no crest is missed.
@@ -109,14 +109,14 @@ fn values_are_those_of_a_closed_form() {
         assert!(value.source.contains("ISO 230-7:2015"), "{}", value.source);
     }
     let about = |symbol: &str| -> Vec<&str> {
-        let of = found.values.iter().filter(|(_, value)| value.symbol == symbol);
-        of.map(|(_, value)| value.reference.as_str()).collect()
+        let of = found.values.iter().filter(|value| value.symbol == symbol);
+        of.map(|value| value.reference.as_deref().unwrap()).collect()
     };
     assert_eq!((about("synchronous-radial-x"), about("synchronous-axial")), (vec!["LSC", "PC"], vec!["PC"]));
     assert!(find(&found, "synchronous-radial-x").source.contains("at z = 60 mm"));
     assert_eq!(find(&found, "synchronous-radial-x").band_upr, [2, 11]);
     assert_eq!(find(&found, "synchronous-axial").band_upr, [1, 11]);
-    assert!(found.values.iter().all(|(of, value)| of == "C" && !value.symbol.contains("rotating")));
+    assert!(found.values.iter().all(|value| value.of.as_deref() == Some("C") && !value.symbol.contains("rotating")));
     assert!(
         found.remarks.len() == 1 && found.remarks[0].contains("no asynchronous and no total values"),
         "{:?}",
@@ -136,7 +136,7 @@ fn directions_have_the_letters_of_the_machine() {
     assert!((find(&found, "synchronous-radial-y").value - 2.0).abs() < 2e-3);
     assert!(find(&found, "synchronous-radial-z").source.contains("direction z, at x = 60 mm"));
     assert!((find(&found, "residual-synchronous-tilt-z").value - 6.0).abs() < 0.01);
-    assert!(found.values.iter().all(|(_, value)| !value.symbol.ends_with("radial-x")));
+    assert!(found.values.iter().all(|value| !value.symbol.ends_with("radial-x")));
 }
 
 /// Limits are checked against these names before there is any data.
@@ -145,7 +145,7 @@ fn every_value_has_a_known_symbol_and_unit() {
     let text = "directions_deg = [30]\nfaces = [{ radius_mm = 20, angle_deg = 0 }]";
     let found = evaluated(axis(equal(24), &closed_form, Ok(independent(24, 1e-4, 1e-3))), text);
     let known = settings(text).symbols();
-    for (_, value) in &found.values {
+    for value in &found.values {
         let known = known.iter().find(|(symbol, _)| *symbol == value.symbol);
         assert_eq!(known.map(|(_, unit)| unit.replace('µ', "u")), Some(value.unit.clone()), "{}", value.symbol);
     }
@@ -157,7 +157,7 @@ fn every_value_has_a_known_symbol_and_unit() {
 
 fn limited(found: &Evaluated, limit: &str, text: &str) -> (Decision, Option<String>) {
     let limit = toml::from_str::<Limit>(limit).unwrap().check(&settings(text), &[], None).unwrap();
-    let (decided, remarks) = decide(&[limit], &found.placed().collect::<Vec<_>>()).unwrap();
+    let (decided, remarks) = decide(&[limit], &found.values.iter().map(Value::placed).collect::<Vec<_>>()).unwrap();
     assert!(remarks.is_empty(), "{remarks:?}");
     (decided[0].decision, decided[0].values[0].missing.clone())
 }
@@ -240,7 +240,7 @@ fn a_part_of_a_turn_has_no_values_and_says_why() {
 #[test]
 fn without_known_errors_there_is_no_uncertainty_and_no_decision() {
     let found = evaluated(axis(equal(36), &closed_form, Err("no repeats".into())), "");
-    for (_, value) in &found.values {
+    for value in &found.values {
         assert!(value.uncertainty.is_none() && value.no_uncertainty.as_deref() == Some("no repeats"), "{value:?}");
     }
     assert_eq!(find(&found, "synchronous-radial-x").absent_above_upr, Some(17));
@@ -255,7 +255,7 @@ fn without_known_errors_there_is_no_uncertainty_and_no_decision() {
         [(independent(35, 0.01, 0.1), "not known at every position"), (independent(36, 0.0, 0.0), "stated as 0")]
     {
         let found = evaluated(axis(equal(36), &closed_form, Ok(errors)), "");
-        assert!(found.values.iter().all(|(_, value)| value.no_uncertainty.as_ref().unwrap().contains(reason)));
+        assert!(found.values.iter().all(|value| value.no_uncertainty.as_ref().unwrap().contains(reason)));
     }
 }
 
@@ -267,14 +267,14 @@ fn what_is_not_observable_has_no_value() {
     let errors = motion.errors.as_mut().unwrap();
     errors.own.iter_mut().for_each(|own| own[2] = [f64::NAN; 5]);
     let found = evaluated(motion, "directions_deg = [45]\nfaces = [{ radius_mm = 20, angle_deg = 0 }]");
-    let symbols: Vec<&str> = found.values.iter().map(|(_, value)| value.symbol.as_str()).collect();
+    let symbols: Vec<&str> = found.values.iter().map(|value| value.symbol.as_str()).collect();
     let across = ["synchronous-radial-y", "synchronous-radial-y-rms"];
     let tilt = ["tilt-x", "tilt-x-rms", "tilt-y", "tilt-y-rms", "tilt-at-45deg", "tilt-at-45deg-rms"];
     let tilt = tilt.map(|id| format!("residual-synchronous-{id}"));
     let expected: Vec<&str> =
         across.into_iter().chain(tilt.iter().map(String::as_str)).chain(["fundamental-tilt"]).collect();
     assert_eq!(symbols, expected);
-    assert!(found.values.iter().all(|(_, value)| value.uncertainty.is_some()));
+    assert!(found.values.iter().all(|value| value.uncertainty.is_some()));
     for said in [
         "no value of axial, face-at-20mm-0deg: not observable",
         "no value of radial-x: not observable at 1 of 36 positions",
@@ -358,9 +358,9 @@ fn held(count: usize, std_um: f64, told: Told, trials: u64) -> Vec<(String, usiz
         measured.of = format!("trial {trial}");
         measured.errors = Ok(errors);
         let found = evaluated(measured, text);
-        for ((_, value), (_, truth)) in found.values.iter().zip(&exact.values) {
-            let key = format!("{} {}", value.symbol, value.reference);
-            assert_eq!(key, format!("{} {}", truth.symbol, truth.reference));
+        for (value, truth) in found.values.iter().zip(&exact.values) {
+            let key = format!("{} {}", value.symbol, value.reference.as_deref().unwrap());
+            assert_eq!(key, format!("{} {}", truth.symbol, truth.reference.as_deref().unwrap()));
             let place = held.iter().position(|known| known.0 == key).unwrap_or_else(|| {
                 held.push((key, 0));
                 held.len() - 1

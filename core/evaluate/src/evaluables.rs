@@ -4,15 +4,15 @@
 use super::{Evaluate, Group, axis_motion, open_profile, plane_map};
 use crate::{
     evaluable::{Evaluable, EvaluableKind},
-    value::{NamedValue, PlacedValue, Value},
+    value::{Value, ValueId},
 };
 use runout_error::Result;
 
-/// Values, each with what it is of, and what they are not.
+/// Values, and what they are not.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Evaluated {
     /// The values.
-    pub values: Vec<(String, Value)>,
+    pub values: Vec<Value>,
     /// What they are not.
     pub remarks: Vec<String>,
 }
@@ -34,21 +34,10 @@ impl Evaluated {
             };
             said.into_iter().chain(unknown(&values)).for_each(|sentence| remarks.add(of, sentence));
             let refuted_by = refuted_by.filter(|_| one.kind() != EvaluableKind::HeightMap).map(str::to_owned);
-            let marked = |value| Value { refuted_by: refuted_by.clone(), ..value };
-            all.values.extend(values.into_iter().map(|value| (of.clone(), marked(value))));
+            all.values.extend(values.into_iter().map(|value| value.of(of).refuted_by(refuted_by.clone())));
         }
         all.remarks = remarks.sentences();
         Ok(all)
-    }
-
-    /// As values of a result.
-    pub fn named(&self) -> impl Iterator<Item = NamedValue> + '_ {
-        self.values.iter().map(|(of, value)| NamedValue::standard(of, value))
-    }
-
-    /// With their places, for limits: what a value is of stands for its section.
-    pub fn placed(&self) -> impl Iterator<Item = PlacedValue<'_>> {
-        self.values.iter().map(|(of, value)| PlacedValue { station: None, section: Some(of), z_mm: None, value })
     }
 }
 
@@ -77,7 +66,7 @@ fn unknown(values: &[Value]) -> Vec<String> {
     let mut reasons: Vec<(&str, Vec<String>)> = Vec::new();
     for value in values {
         let Some(reason) = value.no_uncertainty.as_deref() else { continue };
-        let name = format!("{} about {}", value.symbol, value.reference);
+        let name = ValueId { filter: None, of: None, ..value.id() }.to_string();
         match reasons.iter_mut().find(|(known, _)| *known == reason) {
             Some((_, names)) => names.push(name),
             None => reasons.push((reason, vec![name])),

@@ -73,8 +73,10 @@ fn held(
                 let [(_, amplitude, _)] = waves[..] else { continue };
                 truth = 2.0 * amplitude;
             }
-            let is_same =
-                |value: &&Value| format!("{} {}", value.symbol, value.reference) == name && value.filter == filter;
+            let is_same = |value: &&Value| {
+                format!("{} {}", value.symbol, value.reference.as_deref().unwrap()) == name
+                    && value.filter.as_deref() == Some(filter.as_str())
+            };
             let same = found.iter().find(is_same).unwrap();
             let Some(known) = &same.uncertainty else { continue };
             let [low, high] = known.interval_95;

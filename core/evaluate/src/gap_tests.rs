@@ -35,7 +35,7 @@ fn texture_of_an_open_profile_is_that_of_its_stretches() {
         evaluate.keep_given(&[EvaluableKind::OpenProfile]);
         Evaluated::of(&[Evaluable::OpenProfile(profile)], &evaluate, None).unwrap()
     };
-    let values = |found: &Evaluated| found.values.iter().map(|(_, value)| value.clone()).collect::<Vec<_>>();
+    let values = |found: &Evaluated| found.values.clone();
     let text = "values = ['texture']\nlambda_c_mm = 7.5\n[texture]\nprofiles = ['R', 'P']";
     let whole = found(&|_| true, text);
     let said = |found: &Evaluated| -> Vec<String> {

@@ -1,5 +1,5 @@
 //! The standards' values that a result opens with: what a drawing or a data sheet asks for first. Values of a domain of its own say of
-//! themselves that they are such ([`NamedValue::key`](crate::NamedValue::key)).
+//! themselves that they are such ([`Value::key`](crate::Value::key)).
 
 /// In the order in which they are given; every name of a group of motion values stands for the first direction of it that there is.
 const GROUPS: [&[&str]; 13] = [

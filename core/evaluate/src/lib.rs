@@ -40,7 +40,7 @@ pub use limit::{Decision, Limit, LimitSummary, LimitValue, decide};
 pub use part::{PartSummary, part_summary};
 pub use section::section_values;
 pub use station::EvaluatedStation;
-pub use value::{NamedValue, PlacedValue, Value, ValueId};
+pub use value::{PlacedValue, Value, ValueId, own};
 
 use filter::Filter;
 use runout_draws::{Interval, Uncertainty};
@@ -57,6 +57,11 @@ struct Label {
 impl Label {
     fn new(symbol: &'static str, unit: &'static str, source: impl Into<String>, reference: impl Into<String>) -> Self {
         Self { symbol, unit, source: source.into(), reference: reference.into() }
+    }
+
+    /// A value under it, unfiltered.
+    fn of(self, value: f64) -> Value {
+        Value::referred(self.symbol, value, self.unit, &self.source, &self.reference)
     }
 }
 
@@ -125,21 +130,16 @@ fn labelled(labels: Vec<Label>, found: Vec<Found>, filter: &Filter, held: &Conte
     let known = labels.into_iter().zip(found).filter(|(_, found)| found.value.is_finite());
     known
         .map(|(label, Found { value, uncertainty, no_uncertainty, raised_by_noise })| Value {
-            symbol: label.symbol.into(),
-            unit: ascii_unit(label.unit),
-            value,
-            source: label.source,
             band_upr: filter.band_upr(held.highest_passed()),
             lost_orders: lost_orders.clone(),
             weakened_above_upr,
             absent_above_upr,
             no_uncertainty,
-            filter: filter.name.clone(),
-            reference: label.reference,
+            filter: Some(filter.name.clone()),
             coverage,
             uncertainty,
             raised_by_noise,
-            refuted_by: None,
+            ..label.of(value)
         })
         .collect()
 }

@@ -201,7 +201,8 @@ fn intervals(text: &str, lines: bool, noise_um: f64, profiles: u64) -> BTreeMap<
         result.station = format!("profile {number}");
         let found = section_values(&result, 0, &evaluate, RADIUS_MM);
         for (name, truth) in truth(&waves, &mut random).into_iter().filter(|(name, _)| *name != "RONt MICI") {
-            let same = found.iter().find(|value| format!("{} {}", value.symbol, value.reference) == name);
+            let same =
+                found.iter().find(|value| format!("{} {}", value.symbol, value.reference.as_deref().unwrap()) == name);
             let [inside, stated] = found_inside.entry(name).or_insert([0; 2]);
             if let Some(known) = &same.unwrap().uncertainty {
                 let [low, high] = known.interval_95;
@@ -265,7 +266,8 @@ fn intervals_of_lobes(lobes: usize, noise_um: f64, profiles: u64) -> BTreeMap<&'
         }
         let found = section_values(&result, 0, &evaluate, RADIUS_MM);
         for (name, truth) in [("RONt LSCI", 3.0), ("RONp LSCI", 1.5), ("RONv LSCI", 1.5), ("RONt MZCI", 3.0)] {
-            let same = found.iter().find(|value| format!("{} {}", value.symbol, value.reference) == name);
+            let same =
+                found.iter().find(|value| format!("{} {}", value.symbol, value.reference.as_deref().unwrap()) == name);
             let [low, high] = same.unwrap().uncertainty.as_ref().unwrap().interval_95;
             // Of a zone about another centre, form²/radius.
             let exact = 1e-4;
@@ -313,7 +315,8 @@ fn intervals_of_fine_waves(fine_um: f64, falls: f64, noise_um: f64, profiles: u6
         for (name, truth) in
             truth(&waves, &mut random).into_iter().filter(|(name, _)| name.starts_with("RONt") && *name != "RONt MICI")
         {
-            let same = found.iter().find(|value| format!("{} {}", value.symbol, value.reference) == name);
+            let same =
+                found.iter().find(|value| format!("{} {}", value.symbol, value.reference.as_deref().unwrap()) == name);
             let [low, high] = same.unwrap().uncertainty.as_ref().unwrap().interval_95;
             *held.entry(name).or_insert(0) += u64::from(low <= truth && truth <= high);
         }
@@ -351,8 +354,9 @@ fn intervals_of_like_lobes_hold_where_noise_is_small() {
             let found = section_values(&result, 0, &evaluate, RADIUS_MM);
             let waves = vec![(order, passed * 1.5, waves[0].2)];
             for (name, truth) in truth(&waves, &mut random).into_iter().filter(|(name, _)| names.contains(name)) {
-                let is_same = |value: &&Value| format!("{} {}", value.symbol, value.reference) == name;
-                let same = found.iter().filter(|value| value.filter == filter).find(is_same).unwrap();
+                let is_same =
+                    |value: &&Value| format!("{} {}", value.symbol, value.reference.as_deref().unwrap()) == name;
+                let same = found.iter().filter(|value| value.filter.as_deref() == Some(filter)).find(is_same).unwrap();
                 let [low, high] = same.uncertainty.as_ref().unwrap().interval_95;
                 *held.entry(name).or_insert(0) += u64::from(low <= truth && truth <= high);
             }

@@ -1,6 +1,6 @@
 //! `[[limit]]`: what values have to keep, and what was found of them.
 
-use crate::value::{PlacedValue, Value};
+use crate::value::{PlacedValue, Value, ValueId};
 use runout_error::{Error, Result, fault::known_names};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -59,10 +59,10 @@ pub struct LimitValue {
     pub station: Option<String>,
     /// The section; null for a value of a station or the whole part.
     pub section: Option<String>,
-    /// What it is referred to.
-    pub reference: String,
-    /// Its filter.
-    pub filter: String,
+    /// What it is referred to; null for a domain's own value.
+    pub reference: Option<String>,
+    /// Its filter; null for a domain's own value.
+    pub filter: Option<String>,
     /// Undulations per revolution that it is of, both ends included: what is said of a value without filter is said of
     /// these.
     #[serde(default)]
@@ -81,10 +81,22 @@ pub struct LimitValue {
 }
 
 impl LimitValue {
+    /// Which value it is, by the limit that names it.
+    #[must_use]
+    pub fn id<'a>(&'a self, limit: &'a Limit) -> ValueId<'a> {
+        ValueId {
+            symbol: &limit.symbol,
+            reference: self.reference.as_deref(),
+            filter: self.filter.as_deref(),
+            band_upr: self.band_upr,
+            of: self.section.as_deref(),
+        }
+    }
+
     /// Where it is: "s31, section a"; of a domain's own value what it is of, "X".
     #[must_use]
     pub fn place(&self) -> String {
-        let own = self.reference.is_empty() && self.filter.is_empty();
+        let own = self.reference.is_none() && self.filter.is_none();
         let section = self.section.as_ref().map(|id| if own { id.clone() } else { format!("section {id}") });
         let words: Vec<String> = self.station.iter().cloned().chain(section).collect();
         if words.is_empty() { "whole part".to_owned() } else { words.join(", ") }
@@ -93,12 +105,7 @@ impl LimitValue {
     /// Reference and filter: "MZCI, Gaussian 50 UPR"; empty of a domain's own value.
     #[must_use]
     pub fn by(&self) -> String {
-        [&self.reference, &self.filter]
-            .map(String::as_str)
-            .into_iter()
-            .filter(|text| !text.is_empty())
-            .collect::<Vec<_>>()
-            .join(", ")
+        [&self.reference, &self.filter].into_iter().flatten().map(String::as_str).collect::<Vec<_>>().join(", ")
     }
 }
 
@@ -116,16 +123,16 @@ impl Limit {
         format!("{}{reference}{filter}{section} {} {}", self.symbol, ends.join(" and "), self.unit)
     }
 
-    /// Whether it is one of the value of this symbol, section, reference and filter.
+    /// Whether it is one of this value, which is `of` a section or of what a domain's own values are of.
     #[must_use]
-    pub fn names(&self, symbol: &str, section: Option<&str>, reference: &str, filter: &str) -> bool {
+    pub fn names(&self, id: &ValueId) -> bool {
         // "LSCY" is also "LSCY of centred sections".
-        let referred = self.reference.as_ref().is_none_or(|asked| {
-            reference.strip_prefix(asked.as_str()).is_some_and(|rest| rest.is_empty() || rest.starts_with(" of "))
+        let referred = self.reference.as_deref().is_none_or(|asked| {
+            let rest = id.reference.and_then(|reference| reference.strip_prefix(asked));
+            rest.is_some_and(|rest| rest.is_empty() || rest.starts_with(" of "))
         });
-        let here = self.section.as_ref().is_none_or(|asked| section == Some(asked.as_str()));
-        let filtered = self.filter.as_ref().is_none_or(|asked| asked == filter);
-        symbol == self.symbol && here && referred && filtered
+        let is_asked = |asked: &Option<String>, found: Option<&str>| asked.is_none() || asked.as_deref() == found;
+        id.symbol == self.symbol && referred && is_asked(&self.section, id.of) && is_asked(&self.filter, id.filter)
     }
 }
 
@@ -133,7 +140,7 @@ impl Limit {
     fn decide(&self, placed: &PlacedValue) -> LimitValue {
         let value = placed.value;
         let [low, high] = [self.lower.unwrap_or(f64::NEG_INFINITY), self.upper.unwrap_or(f64::INFINITY)];
-        let interval_95 = value.uncertainty.as_ref().map(|uncertainty| uncertainty.interval_95);
+        let interval_95 = value.interval_95();
         let refuted = value.refuted_by.as_ref().map(|by| format!("its own data refute the value: {by}"));
         let missing = refuted.or_else(|| missing(value));
         let decision = match interval_95 {
@@ -174,7 +181,7 @@ fn missing(value: &Value) -> Option<String> {
     if let Some(order) = value.absent_above_upr {
         let said = format!("its filter passes more than a thousandth above order {order}, the highest that there is");
         let cut_off = value.band_upr[1];
-        let remedy = value.filter.starts_with("Gaussian") && cut_off < order;
+        let remedy = value.filter.as_deref().is_some_and(|filter| filter.starts_with("Gaussian")) && cut_off < order;
         return Some(if remedy {
             format!("{said}: `samples_per_rev` ≥ {} holds all", samples_for(cut_off))
         } else {
@@ -216,9 +223,8 @@ pub fn decide(limits: &[Limit], all: &[PlacedValue]) -> Result<(Vec<LimitSummary
     limits.iter().try_for_each(|limit| check_section(limit, all))?;
     let mut remarks = Vec::new();
     let decide = |limit: &Limit| {
-        let named = all.iter().filter(|PlacedValue { section, value, .. }| {
-            limit.names(&value.symbol, *section, &value.reference, &value.filter)
-        });
+        // What is not observable is not there to keep a limit.
+        let named = all.iter().filter(|placed| limit.names(&placed.id()) && placed.value.value.is_finite());
         let values: Vec<LimitValue> = named.map(|placed| limit.decide(placed)).collect();
         if values.is_empty() {
             let mut symbols: Vec<&str> = all.iter().map(|placed| &*placed.value.symbol).collect();
@@ -243,16 +249,13 @@ mod tests {
     #![allow(clippy::unwrap_used, reason = "tests")]
 
     use super::*;
-    use crate::NamedValue;
 
     /// A limit of a domain's own values names what they are of.
     #[test]
     fn a_section_that_no_own_value_is_of_is_refused() {
-        let values = ["X", "Y"].map(|axis| NamedValue::new("A", 1.0, 0.1, "um", "bi-directional accuracy").of(axis));
-        let whole = NamedValue::new("E", 1.0, 0.1, "um", "of the machine");
-        let own: Vec<_> =
-            values.iter().chain([&whole]).map(|value| (value.of.as_deref(), value.own().unwrap())).collect();
-        let placed: Vec<_> = own.iter().map(PlacedValue::own).collect();
+        let values = ["X", "Y"].map(|axis| Value::new("A", 1.0, 0.1, "um", "bi-directional accuracy").of(axis));
+        let whole = Value::new("E", 1.0, 0.1, "um", "of the machine");
+        let placed: Vec<_> = values.iter().chain([&whole]).map(Value::placed).collect();
         let limit = |text: &str| toml::from_str::<Limit>(&format!("{text}\nupper = 2.0\nunit = 'um'")).unwrap();
         let decided = |text: &str| decide(&[limit(text)], &placed);
         assert_eq!(decided("symbol = 'A'\nsection = 'X'").unwrap().0[0].values.len(), 1);

@@ -1,7 +1,7 @@
 //! Straightness and texture of an open profile.
 
 use super::{
-    Evaluate, Found, Group, Label, ascii_unit,
+    Evaluate, Found, Group, Label,
     texture::{found, sensitivity},
 };
 use crate::Value;
@@ -182,20 +182,10 @@ fn labelled(label: Label, found: Found, filter: &str, profile: &OpenProfile) -> 
     let there: Vec<f64> = there.map(|(z_mm, _)| *z_mm).collect();
     let share = there.len() as f64 / profile.deviation_um.len().max(1) as f64;
     found.value.is_finite().then(|| Value {
-        symbol: label.symbol.into(),
-        unit: ascii_unit(label.unit),
-        value: found.value,
-        source: label.source,
-        band_upr: [0, 0],
-        lost_orders: Vec::new(),
-        weakened_above_upr: None,
-        absent_above_upr: None,
-        filter: filter.to_owned(),
-        reference: label.reference,
+        filter: Some(filter.to_owned()),
         coverage: share.min(covered(&there)),
         uncertainty: found.uncertainty,
         no_uncertainty: found.no_uncertainty,
-        raised_by_noise: None,
-        refuted_by: None,
+        ..label.of(found.value)
     })
 }

@@ -3,7 +3,6 @@
 use super::{
     Evaluate, FormRemoval, Group, Label,
     areal::{filter, filtered},
-    ascii_unit,
 };
 use crate::Value;
 use crate::evaluable::PlaneMap;
@@ -56,21 +55,10 @@ pub(super) fn values(plane: &PlaneMap, evaluate: &Evaluate) -> Result<(Vec<Value
     let filter = filter(evaluate, 1.0).name;
     let known = labelled.into_iter().filter(|(_, value)| value.is_finite());
     let values = known.map(|(label, value)| Value {
-        symbol: label.symbol.into(),
-        unit: ascii_unit(label.unit),
-        value,
-        source: label.source,
-        band_upr: [0, 0],
-        lost_orders: Vec::new(),
-        weakened_above_upr: None,
-        absent_above_upr: None,
-        filter: filter.clone(),
-        reference: label.reference,
+        filter: Some(filter.clone()),
         coverage: there,
-        uncertainty: None,
         no_uncertainty: Some(plane.no_uncertainty.clone().unwrap_or_else(|| POINT_BY_POINT.into())),
-        raised_by_noise: None,
-        refuted_by: None,
+        ..label.of(value)
     });
     Ok((values.collect(), remark.into_iter().chain(found.features.problem()).collect()))
 }

@@ -65,7 +65,7 @@ impl Wall {
             found.push(positions.as_ref().map_or(f64::NAN, |all| all.total_runout_um));
         });
         for value in values.iter_mut().filter(|value| value.symbol == "eccentricity") {
-            let ring = others.iter().find(|ring| name(ring) == value.reference);
+            let ring = others.iter().find(|ring| Some(name(ring)) == value.reference);
             let std_um = ring.map(|ring| self.centre_std_um(filter, *ring, datums));
             value.uncertainty = value.uncertainty.take().zip(std_um).map(|(known, std_um)| {
                 // The centre of an arc takes errors of other orders too.

@@ -4,7 +4,7 @@
 //! A sensor that looks at the part angle α₀ = θ′ − β at spindle angle 0 reads the coefficient m = C e^{iα₀} of Re m e^{−iΦ}, conjugated where
 //! the part turns clockwise. C is the mean over the section's sensors of what each of them says.
 
-use super::{Label, ascii_unit};
+use super::Label;
 use crate::Value;
 use runout_draws::{Uncertainty, noise_95, student_95};
 use runout_numerics::Complex64;
@@ -37,23 +37,7 @@ pub(crate) fn first_centre_um(profiles: &[Profile], rig: &Rig, section: usize) -
 }
 
 fn value(label: Label, band_upr: [usize; 2], value: f64, uncertainty: Option<Uncertainty>) -> Value {
-    Value {
-        symbol: label.symbol.into(),
-        unit: ascii_unit(label.unit),
-        value,
-        source: label.source,
-        band_upr,
-        lost_orders: Vec::new(),
-        weakened_above_upr: None,
-        absent_above_upr: None,
-        filter: "none".into(),
-        reference: label.reference,
-        coverage: 1.0,
-        uncertainty,
-        no_uncertainty: None,
-        raised_by_noise: None,
-        refuted_by: None,
-    }
+    Value { band_upr, uncertainty, ..label.of(value) }
 }
 
 /// A section's centre beside the axis of rotation.

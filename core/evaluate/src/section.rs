@@ -41,10 +41,14 @@ pub(crate) fn missing_circles(
     let form = Form::of(result, section, radius_mm).filter(|_| evaluate.has(Group::Roundness));
     let Some(form) = form else { return Vec::new() };
     let ront = || values.iter().filter(|value| value.symbol == "RONt");
-    let mut filters: Vec<&str> = ront().map(|value| value.filter.as_str()).collect();
+    let mut filters: Vec<&str> = ront().filter_map(|value| value.filter.as_deref()).collect();
     filters.dedup();
     let lacks = |reference: &Reference| {
-        let has = |filter: &str| ront().any(|value| value.reference == reference.symbol() && value.filter == filter);
+        let has = |filter: &str| {
+            ront().any(|value| {
+                value.reference.as_deref() == Some(reference.symbol()) && value.filter.as_deref() == Some(filter)
+            })
+        };
         let without: Vec<&str> = filters.iter().copied().filter(|filter| !has(filter)).collect();
         (!without.is_empty() || filters.is_empty()).then_some((*reference, without))
     };

@@ -63,7 +63,11 @@ pub(super) fn evaluate(text: &str) -> Result<Evaluate, Fault> {
 }
 
 pub(super) fn find<'a>(values: &'a [Value], symbol: &str, reference: &str, filter: &str) -> &'a Value {
-    let wanted = |value: &&Value| value.symbol == symbol && value.reference == reference && value.filter == filter;
+    let wanted = |value: &&Value| {
+        value.symbol == symbol
+            && value.reference.as_deref() == Some(reference)
+            && value.filter.as_deref() == Some(filter)
+    };
     values.iter().find(wanted).unwrap_or_else(|| panic!("no {symbol} {reference} {filter} in {values:?}"))
 }
 
@@ -121,12 +125,15 @@ fn an_arc_says_which_circle_it_does_not_have() {
     let values = section_values(&result, 0, &evaluate, RADIUS_MM);
     assert!(missing_circles(&result, 0, &evaluate, RADIUS_MM, &values).is_empty());
     // A value that is not there is said to be missing also where the circle could be found.
-    let but_one: Vec<Value> = values.iter().filter(|value| value.reference != "MICI").cloned().collect();
+    let but_one: Vec<Value> =
+        values.iter().filter(|value| value.reference.as_deref() != Some("MICI")).cloned().collect();
     let missing = missing_circles(&result, 0, &evaluate, RADIUS_MM, &but_one);
     assert!(missing.len() == 1 && missing[0].contains("no RONt about MICI"), "{missing:?}");
     result.separation.sections[0].gaps.add(0.0, 200_f64.to_radians());
     let values = section_values(&result, 0, &evaluate, RADIUS_MM);
-    let about = |reference: &str| values.iter().any(|value| value.symbol == "RONt" && value.reference == reference);
+    let about = |reference: &str| {
+        values.iter().any(|value| value.symbol == "RONt" && value.reference.as_deref() == Some(reference))
+    };
     assert_eq!(["LSCI", "MICI", "MCCI"].map(about), [true, false, true]);
     let missing = missing_circles(&result, 0, &evaluate, RADIUS_MM, &values);
     assert!(missing.len() == 1 && missing[0].contains("section a: no RONt about MICI"), "{missing:?}");
@@ -145,7 +152,7 @@ fn half_of_a_wave_at_the_cut_off_is_left() {
     }
     // 20 orders do not reach the usual cut-off.
     let values = section_values(&station(0.0, &[lobes(3, 2.0)], 20, f64::NAN, &[]), 0, &Evaluate::default(), RADIUS_MM);
-    assert!(values.iter().all(|value| value.filter == "none"));
+    assert!(values.iter().all(|value| value.filter.as_deref() == Some("none")));
 }
 
 #[test]
@@ -329,7 +336,7 @@ fn cylindricity_intervals(text: &str, noise_um: f64, trials: u64) -> Vec<(String
         let found: Vec<Vec<(usize, Complex64)>> =
             truth.iter().map(|ring| ring.iter().map(&mut disturbed).collect()).collect();
         let (exact, found) = (of(&truth, false), of(&found, true));
-        names = exact.iter().map(|value| format!("{} {}", value.symbol, value.reference)).collect();
+        names = exact.iter().map(|value| format!("{} {}", value.symbol, value.reference.as_deref().unwrap())).collect();
         inside.resize(exact.len(), 0);
         errors.resize(exact.len(), Vec::new());
         stated.resize(exact.len(), 0.0);
@@ -597,7 +604,10 @@ fn intervals_of_positions_hold_the_truth() {
                 .map(|(waves, z)| station(z, waves, 12, variance, &[]))
                 .collect();
             let values = part(&stations, true, text).values;
-            values.into_iter().filter(|value| value.reference.contains("axis of")).collect::<Vec<Value>>()
+            values
+                .into_iter()
+                .filter(|value| value.reference.as_ref().unwrap().contains("axis of"))
+                .collect::<Vec<Value>>()
         };
         let truth: Vec<Vec<(usize, Complex64)>> = (0..4)
             .map(|_| (1..=12).map(|order| (order, Complex64::new(normal(), normal()) / order as f64)).collect())
@@ -611,7 +621,7 @@ fn intervals_of_positions_hold_the_truth() {
         inside.resize(exact.len(), (String::new(), 0));
         for ((name, inside), (exact, found)) in inside.iter_mut().zip(exact.iter().zip(&found)) {
             let [low, high] = found.uncertainty.as_ref().unwrap().interval_95;
-            *name = format!("{} {}", exact.symbol, exact.reference);
+            *name = format!("{} {}", exact.symbol, exact.reference.as_deref().unwrap());
             *inside += usize::from((low..=high).contains(&exact.value));
         }
     }
@@ -675,21 +685,9 @@ fn intervals_of_lines_hold_from_zero_on() {
 fn limited(limits: &str) -> Vec<(Decision, Vec<(Decision, bool)>, usize)> {
     let uncertainty = |std: f64, value: f64| Uncertainty::new(std, [value - 2.0 * std, value + 2.0 * std], 400);
     let value = |reference: &str, value: f64, std: Option<f64>| Value {
-        symbol: "RONt".into(),
-        unit: "um".into(),
-        value,
-        source: String::new(),
         band_upr: [2, 50],
-        lost_orders: Vec::new(),
-        weakened_above_upr: None,
-        absent_above_upr: None,
-        no_uncertainty: None,
-        filter: "none".into(),
-        reference: reference.into(),
-        coverage: 1.0,
         uncertainty: std.map(|std| uncertainty(std, value)),
-        raised_by_noise: None,
-        refuted_by: None,
+        ..Value::referred("RONt", value, "um", "", reference)
     };
     let all =
         [("a", value("LSCI", 4.0, Some(0.25))), ("a", value("MZCI", 3.8, Some(0.25))), ("b", value("LSCI", 4.0, None))];
@@ -735,7 +733,7 @@ fn nothing_is_proven_of_a_value_that_lacks_orders() {
         let values = section_values(&result, 0, &evaluate, RADIUS_MM);
         let placed = values.iter().map(|value| PlacedValue { station: None, section: None, z_mm: None, value });
         let (found, _) = decide(std::slice::from_ref(&limit), &placed.collect::<Vec<_>>()).unwrap();
-        found[0].values.iter().map(|value| (value.filter.clone(), value.decision)).collect::<Vec<_>>()
+        found[0].values.iter().map(|value| (value.filter.clone().unwrap(), value.decision)).collect::<Vec<_>>()
     };
     let of = |none, filtered| vec![("none".to_owned(), none), ("Gaussian 50 UPR".to_owned(), filtered)];
     assert_eq!(decided(&[], None), of(Decision::Conforms, Decision::Conforms));

@@ -3,7 +3,7 @@
 mod reported;
 
 pub use reported::ReportedValue;
-pub use runout_evaluate::{Decision, Limit, LimitSummary, LimitValue, NamedValue, PartSummary, PlacedValue, Value};
+pub use runout_evaluate::{Decision, Limit, LimitSummary, LimitValue, PartSummary, PlacedValue, Value};
 
 use std::{collections::BTreeMap, path::PathBuf};
 
@@ -12,6 +12,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 
 use runout_closed_loop::{correction::Correction, diagnosis};
 use runout_consistency::{Check, Test, refuted_by};
+use runout_evaluate::own;
 use runout_turning::{provenance::Provenance, reading::ReadingValues, separation::Assessment, surface::Meeting};
 
 /// What a run found, for people and programs.
@@ -36,8 +37,9 @@ pub struct Summary {
     /// The surface, where one was built.
     pub surface: Option<SurfaceSummary>,
     /// Values of a domain that are not those of a form: of measured points.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub values: Vec<NamedValue>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty", with = "own")]
+    #[schemars(with = "Vec<own::OwnValue>")]
+    pub values: Vec<Value>,
     /// The tests of the data on themselves: what was tested, what it found and what was done.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub consistency: Vec<Check>,
@@ -69,9 +71,10 @@ impl Summary {
         all
     }
 
-    /// A domain's own values as those that limits name, with what each is of.
-    pub(crate) fn own_values(&self) -> Vec<(Option<&str>, Value)> {
-        self.values.iter().filter_map(|value| Some((value.of.as_deref(), value.own()?))).collect()
+    /// Every value: of form and motion, then those of the domain.
+    #[must_use]
+    pub fn all_values(&self) -> Vec<PlacedValue<'_>> {
+        self.placed_values().into_iter().chain(self.values.iter().map(Value::placed)).collect()
     }
 
     /// Marks the values of the whole part, where the data of one of its stations refute what is said of them.
@@ -84,12 +87,10 @@ impl Summary {
     /// What refutes values of this result, each reason once with the number of values, and how many values there are.
     #[must_use]
     pub fn refuted(&self) -> (Vec<(&str, usize)>, usize) {
-        let placed = self.placed_values();
-        let all = placed.iter().map(|placed| placed.value.refuted_by.as_deref());
-        let all: Vec<Option<&str>> = all.chain(self.values.iter().map(|value| value.refuted_by.as_deref())).collect();
+        let all = self.all_values();
         let mut reasons: Vec<(&str, usize)> = Vec::new();
-        for reason in all.iter().flatten() {
-            match reasons.iter_mut().find(|(known, _)| known == reason) {
+        for reason in all.iter().filter_map(|placed| placed.value.refuted_by.as_deref()) {
+            match reasons.iter_mut().find(|(known, _)| *known == reason) {
                 Some((_, count)) => *count += 1,
                 None => reasons.push((reason, 1)),
             }
@@ -101,6 +102,26 @@ impl Summary {
     pub fn findings(&self) -> impl Iterator<Item = &String> {
         self.warnings.iter().filter(|warning| !self.notes.contains(warning))
     }
+}
+
+/// The observable ones of a domain's values that were there before the loop changed them.
+#[must_use]
+pub fn moved(before: &[Value], after: &[Value]) -> Vec<diagnosis::Moved> {
+    let of = |value: &Value| {
+        let before = before.iter().find(|one| one.id() == value.id())?;
+        Some(diagnosis::Moved {
+            value: value.symbol.clone(),
+            section: value.of.clone(),
+            before: before.number()?,
+            after: value.number()?,
+            std: value.std(),
+            unit: value.unit.clone(),
+            reference: value.reference.clone(),
+            filter: value.filter.clone(),
+            lost_orders: Vec::new(),
+        })
+    };
+    after.iter().filter_map(of).collect()
 }
 
 /// Orders that cannot be separated.

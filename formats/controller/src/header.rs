@@ -1,6 +1,6 @@
 //! What a file says of itself: conventions, what it leaves out, and the error that is expected after it.
 
-use runout_core::stage::Completed;
+use runout_core::{stage::Completed, summary::Value};
 
 use crate::{
     chain::{Chain, free_rms_um},
@@ -53,9 +53,8 @@ fn expected(dialect: &dyn Dialect, whole: &Chain, kept: &Chain, result: &Complet
             [0, 1, 2].map(|axis| error[axis] + adds[axis])
         })
         .collect();
-    let values = result.summary.reported_values();
-    let other = values.iter().find(|value| value.id.symbol == "volumetric_rms_after").and_then(|value| value.value);
-    let other_um = other.unwrap_or(0.0);
+    let other = result.summary.values.iter().find(|value| value.symbol == "volumetric_rms_after");
+    let other_um = other.and_then(Value::number).unwrap_or(0.0);
     let [before, after] = [before, left].map(|errors| free_rms_um(&places, &errors).hypot(other_um));
     Some(format!(
         "expected rms error over the volume, less the rigid motion that fits best: before {before:.3} um, after {after:.3} um; \

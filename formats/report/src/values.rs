@@ -3,8 +3,8 @@
 use std::collections::HashMap;
 
 use runout_core::{
-    draws::IntervalKind,
-    summary::Summary,
+    draws::Uncertainty,
+    summary::{PlacedValue, Summary},
     table::number::{significant, with_std},
 };
 use serde::Serialize;
@@ -102,63 +102,48 @@ impl Columns {
 }
 
 fn rows(summary: &Summary) -> Vec<Row> {
-    let placed = summary.placed_values();
-    let of_form = placed.iter().map(|placed| {
-        let value = placed.value;
-        let uncertainty = value.uncertainty.as_ref();
-        let std = uncertainty.map(|uncertainty| uncertainty.std);
-        let place = match (placed.station, placed.section) {
-            (None, None) => "whole part".to_owned(),
-            (Some(station), None) => station.to_owned(),
-            (None, Some(section)) => format!("section {section}"),
-            (Some(station), Some(section)) => format!("{station}, section {section}"),
-        };
-        let lacks = match value.lost_orders.len() {
-            0 => String::new(),
-            1 => format!("order {} is lost; ", value.lost_orders[0]),
-            count => format!("{count} orders are lost, the first is {}; ", value.lost_orders[0]),
-        };
-        Row {
-            place: one_line(&place),
-            symbol: value.symbol.clone(),
-            shown: with_std(value.value, std) + mark(value.refuted_by.as_ref()),
-            value: finite(value.value),
-            std,
-            unit: symbol(&value.unit),
-            interval: uncertainty.map_or_else(String::new, |known| interval((known.interval_95, known.std))),
-            kind: uncertainty.map_or("", |known| known.kind.name()),
-            refers: [value.reference.as_str(), value.filter.as_str()].join(", "),
-            group: match (placed.station, placed.section) {
-                // Where each section is a station of its own, all sections are alike.
-                (Some(station), Some(section)) if station == section => "sections".into(),
-                (Some(_), Some(section)) => format!("section {}", one_line(section)),
-                (Some(_), None) => "stations".into(),
-                (None, _) => String::new(),
-            },
-            remark: format!(
-                "{lacks}{}{}",
-                value.raised_by_noise.map_or_else(String::new, |by| format!("raised by noise, by {by:.2e}; ")),
-                reason(value.refuted_by.as_ref())
-            ),
-            about: format!("{}; {} to {} UPR", value.source, value.band_upr[0], value.band_upr[1]),
-        }
-    });
-    let named = summary.values.iter().map(|value| Row {
-        place: value.of.as_deref().map(one_line).unwrap_or_default(),
+    summary.all_values().into_iter().map(row).collect()
+}
+
+fn row(placed: PlacedValue) -> Row {
+    let value = placed.value;
+    // A domain's own values are of a part or of the whole, and of no orders.
+    let is_of_form = value.band_upr != [0; 2];
+    let place = match (placed.station, placed.part()) {
+        (None, None) if is_of_form => "whole part".to_owned(),
+        (station, part) => station.map(str::to_owned).into_iter().chain(part).collect::<Vec<_>>().join(", "),
+    };
+    let lacks = match value.lost_orders.len() {
+        0 => String::new(),
+        1 => format!("order {} is lost; ", value.lost_orders[0]),
+        count => format!("{count} orders are lost, the first is {}; ", value.lost_orders[0]),
+    };
+    let band = if is_of_form { format!("; {} to {} UPR", value.band_upr[0], value.band_upr[1]) } else { String::new() };
+    let shown = value.number().map_or_else(|| "not observable".into(), |number| with_std(number, value.std()));
+    Row {
+        place: one_line(&place),
         symbol: value.symbol.clone(),
-        shown: value.value.map_or_else(|| "not observable".into(), |number| with_std(number, value.std))
-            + mark(value.refuted_by.as_ref()),
-        value: value.value.and_then(finite),
-        std: value.std,
+        shown: shown + mark(value.refuted_by.as_ref()),
+        value: value.number(),
+        std: value.std(),
         unit: symbol(&value.unit),
-        interval: value.interval_95.zip(value.std).map_or_else(String::new, interval),
-        kind: value.interval_95.map_or("", |_| IntervalKind::Coverage.name()),
+        interval: value.uncertainty.as_ref().map_or_else(String::new, interval),
+        kind: value.uncertainty.as_ref().map_or("", |known| known.kind.name()),
         refers: [&value.reference, &value.filter].into_iter().flatten().cloned().collect::<Vec<_>>().join(", "),
-        group: String::new(),
-        remark: reason(value.refuted_by.as_ref()),
-        about: value.about.clone(),
-    });
-    of_form.chain(named).collect()
+        group: match (placed.station, placed.section) {
+            // Where each section is a station of its own, all sections are alike.
+            (Some(station), Some(section)) if station == section => "sections".into(),
+            (Some(_), Some(section)) => format!("section {}", one_line(section)),
+            (Some(_), None) => "stations".into(),
+            (None, _) => String::new(),
+        },
+        remark: format!(
+            "{lacks}{}{}",
+            value.raised_by_noise.map_or_else(String::new, |by| format!("raised by noise, by {by:.2e}; ")),
+            reason(value.refuted_by.as_ref())
+        ),
+        about: format!("{}{band}", value.source),
+    }
 }
 
 /// The mark of a number that its own data refute.
@@ -170,13 +155,9 @@ fn reason(refuted_by: Option<&String>) -> String {
     refuted_by.map_or_else(String::new, |by| format!("! its own data refute it: {}", one_line(by)))
 }
 
-fn finite(number: f64) -> Option<f64> {
-    number.is_finite().then_some(number)
-}
-
 /// A 95 % interval as it is shown.
-fn interval((ends, std): ([f64; 2], f64)) -> String {
-    let [low, high] = ends.map(|end| as_precise(end, std));
+fn interval(known: &Uncertainty) -> String {
+    let [low, high] = known.interval_95.map(|end| as_precise(end, known.std));
     format!("{low} … {high}")
 }
 

@@ -14,7 +14,6 @@ mod sheets;
 mod xlsx;
 
 use runout_core::{
-    draws::IntervalKind,
     pipeline::{Plugin, Registry},
     summary::{Decision, ReportedValue},
 };
@@ -73,26 +72,28 @@ const COLUMNS: [(&str, u16); 17] = [
 
 /// A value's row, as [`COLUMNS`].
 fn row<'a>(value: &ReportedValue<'a>) -> [Cell<'a>; COLUMNS.len()] {
-    let [low, high] = value.interval_95.map_or([None; 2], |ends| ends.map(Some));
-    let limit = value.limit.map(|(limit, _)| limit);
+    let (reported, value) = (value, value.value());
+    let (place, id) = (reported.placed, reported.placed.id());
+    let limit = reported.limit.map(|(limit, _)| limit);
+    let [low, high] = value.interval_95().map_or([None; 2], |ends| ends.map(Some));
     [
-        Cell::text(value.station),
-        Cell::text(value.id.of),
-        Cell::number(value.z_mm),
-        Cell::text(Some(value.id.symbol)),
-        Cell::text(value.id.reference),
-        Cell::text(value.id.filter),
-        Cell::number(value.value),
-        Cell::text(Some(value.unit)),
-        Cell::number(value.std),
+        Cell::text(place.station),
+        Cell::text(id.of),
+        Cell::number(place.z_mm),
+        Cell::text(Some(id.symbol)),
+        Cell::text(id.reference),
+        Cell::text(id.filter),
+        Cell::number(value.number()),
+        Cell::text(Some(&value.unit)),
+        Cell::number(value.std()),
         Cell::number(low),
         Cell::number(high),
-        Cell::text(value.interval.map(IntervalKind::name)),
+        Cell::text(value.uncertainty.as_ref().map(|known| known.kind.name())),
         Cell::number(limit.and_then(|limit| limit.lower)),
         Cell::number(limit.and_then(|limit| limit.upper)),
-        Cell::text(decision(value).map(decision_name)),
-        Cell::text(value.remark()),
-        Cell::text(Some(value.about)),
+        Cell::text(decision(reported).map(decision_name)),
+        Cell::text(reported.remark()),
+        Cell::text(Some(&value.source)),
     ]
 }
 

@@ -80,7 +80,7 @@ fn contents(summary: &Summary, config: &QDasConfig) -> Vec<u8> {
     // What is not observable has no value to state.
     let values: Vec<(ReportedValue, f64)> = (summary.reported_values().into_iter())
         .filter(|value| value.limit.is_some() || !config.only_limited)
-        .filter_map(|value| value.value.map(|number| (value, number)))
+        .filter_map(|value| value.value().number().map(|number| (value, number)))
         .collect();
     let mut text = String::new();
     let mut field = |key: &str, content: &str| {
@@ -99,9 +99,9 @@ fn contents(summary: &Summary, config: &QDasConfig) -> Vec<u8> {
         let mut of_value = |key: &str, content: &str| field(&format!("{key}/{number}"), content);
         of_value("K2001", &number.to_string());
         of_value("K2002", &description(value));
-        of_value("K2003", value.id.symbol);
+        of_value("K2003", &value.value().symbol);
         of_value("K2004", "0");
-        of_value("K2022", &digits(value.std).to_string());
+        of_value("K2022", &digits(value.value().std()).to_string());
         if let Some((limit, _)) = value.limit {
             for (limit_key, kind_key, end) in [("K2110", "K2120", limit.lower), ("K2111", "K2121", limit.upper)] {
                 let end = end.map(|end| end.to_string()).unwrap_or_default();
@@ -109,7 +109,7 @@ fn contents(summary: &Summary, config: &QDasConfig) -> Vec<u8> {
                 of_value(limit_key, &end);
             }
         }
-        of_value("K2142", value.unit);
+        of_value("K2142", &value.value().unit);
         of_value("K2900", &remark(value));
     }
     let time = config.time.as_ref().map(|time| format!("{WITHIN}{time}")).unwrap_or_default();
@@ -123,20 +123,20 @@ fn contents(summary: &Summary, config: &QDasConfig) -> Vec<u8> {
 
 /// "RONt about LSCI, Gaussian 50 UPR of a, station s1".
 fn description(value: &ReportedValue) -> String {
-    let station = value.station.map(|station| format!(", station {station}")).unwrap_or_default();
+    let station = value.placed.station.map(|station| format!(", station {station}")).unwrap_or_default();
     // The band is said where it alone distinguishes values: harmonics of one order.
-    let order = match value.id.band_upr {
+    let order = match value.value().band_upr {
         [low, high] if low == high && low > 0 => format!(", order {low}"),
         _ => String::new(),
     };
-    format!("{}{order}{station}", value.id)
+    format!("{}{order}{station}", value.placed.id())
 }
 
 /// What no field has: uncertainty, interval, decision.
 fn remark(value: &ReportedValue) -> String {
     let mut parts = Vec::new();
-    parts.extend(value.std.map(|std| format!("standard uncertainty {std:.3e}")));
-    parts.extend(value.interval_95.map(|[low, high]| format!("95 % interval {low:.6} to {high:.6}")));
+    parts.extend(value.value().std().map(|std| format!("standard uncertainty {std:.3e}")));
+    parts.extend(value.value().interval_95().map(|[low, high]| format!("95 % interval {low:.6} to {high:.6}")));
     parts.extend(decision(value).map(|decision| format!("ISO 14253-1: {}", decision_name(decision))));
     parts.extend(value.remark().map(str::to_owned));
     parts.join("; ")

@@ -2,7 +2,7 @@
 
 use runout_core::{
     Error, ErrorKind, Result, height_grid::HeightGrid, numerics::least_squares::Basis,
-    standards::areal::without_polynomial, summary::NamedValue,
+    standards::areal::without_polynomial, summary::Value,
 };
 
 use crate::{
@@ -23,7 +23,7 @@ pub(crate) struct Removed {
     /// What was found, behind the name: ", radius 10.0021 mm". Empty where there is nothing to say.
     pub found: String,
     /// Radius and direction of it.
-    pub values: Vec<NamedValue>,
+    pub values: Vec<Value>,
 }
 
 /// Removes the form from a map, or from a profile as a map of one row.
@@ -92,7 +92,7 @@ fn quadric(grid: &mut HeightGrid, form: FormRemoval, is_profile: bool, object: &
     }
     let side = if radius_mm > 0.0 { "outer" } else { "inner" };
     let value = |symbol: &str, value: f64, unit: &str, about: String| {
-        NamedValue::new(symbol, value, f64::NAN, unit, &about).of("form")
+        Value::new(symbol, value, f64::NAN, unit, &about).of("form")
     };
     let about =
         format!("radius of the {name} that is removed, an {side} surface, by least squares of the vertical distance");

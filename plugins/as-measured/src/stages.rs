@@ -3,7 +3,7 @@
 use runout_core::{
     Error, ErrorKind, Result,
     height_grid::HeightGrid,
-    summary::NamedValue,
+    summary::Value,
     table::{ColumnSpec, TableRows, TableSpec, counts, texts},
 };
 
@@ -35,7 +35,7 @@ pub(crate) struct Staged {
     pub by_filling: Option<TableRows>,
     /// The standard uncertainty of Sq by filling, in nm.
     pub sq_by_filling_nm: Option<f64>,
-    pub values: Vec<NamedValue>,
+    pub values: Vec<Value>,
 }
 
 /// The table of the stages.

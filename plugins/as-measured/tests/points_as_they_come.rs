@@ -22,7 +22,9 @@ fn run(load: &str, separate: &str) -> Result<Summary, String> {
 
 fn rons(summary: &Summary) -> Vec<(Option<String>, f64)> {
     let placed = summary.placed_values();
-    let ront = placed.iter().filter(|placed| placed.value.symbol == "RONt" && placed.value.reference == "LSCI");
+    let ront = placed
+        .iter()
+        .filter(|placed| placed.value.symbol == "RONt" && placed.value.reference.as_deref() == Some("LSCI"));
     ront.map(|placed| (placed.section.map(str::to_owned), placed.value.value)).collect()
 }
 
@@ -93,7 +95,7 @@ fn units_of_any_length_and_rounded_grids() {
     }
     let path = written(folder.path(), "map.txt", &lines);
     let summary = run(&path, "form = 'none'").unwrap();
-    let sq = summary.values.iter().find(|value| value.symbol == "Sq").unwrap().value.unwrap();
+    let sq = summary.values.iter().find(|value| value.symbol == "Sq").unwrap().value;
     assert!((sq - 1.0).abs() < 1e-9, "{sq}");
     let both = written(folder.path(), "both.csv", "x_mm,y_mm,height_um,height [mm]\n0,0,1,2\n");
     assert!(run(&both, "form = 'none'").unwrap_err().contains("could be `height_nm`"));

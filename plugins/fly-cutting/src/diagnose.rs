@@ -167,7 +167,7 @@ fn unexplained(stranger: &Stranger) -> Unexplained {
 fn moved(after: &Outcome) -> Vec<Moved> {
     let number = |symbol: &str, of: &str| {
         let found = after.values.iter().find(|value| value.symbol == symbol && value.of.as_deref() == Some(of));
-        found.and_then(|value| Some((value.value?, value.unit.clone())))
+        found.and_then(|value| Some((value.number()?, value.unit.clone())))
     };
     let of = |symbol: &&str| {
         let (before, unit) = number(symbol, "measured")?;

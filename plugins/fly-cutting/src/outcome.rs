@@ -6,7 +6,7 @@ use runout_core::{
     numerics::height_map::HeightMap,
     stage::{Evaluable, Outcome, PlaneMap},
     standards::areal,
-    summary::NamedValue,
+    summary::Value,
     table::{ColumnSpec, Figure, TableRows, TableSpec, numbers},
 };
 
@@ -98,12 +98,12 @@ impl Known<'_> {
     }
 
     /// Height parameters after removal of the least-squares plane.
-    fn areal(&self, of: &str, heights_nm: impl Iterator<Item = f64>) -> Result<Vec<NamedValue>> {
+    fn areal(&self, of: &str, heights_nm: impl Iterator<Item = f64>) -> Result<Vec<Value>> {
         let map: HeightMap = areal::without_polynomial(&self.grid.heights(heights_nm, None).height_map()?, 1)?;
         let found = areal::heights(&map);
         let about = |what: &str| format!("{what} after removal of the least-squares plane (ISO 25178-2, 4.2)");
         let named = |symbol: &str, number: f64, unit: &str, what: &str| {
-            NamedValue::new(symbol, number, f64::NAN, unit, &about(what)).of(of)
+            Value::new(symbol, number, f64::NAN, unit, &about(what)).of(of)
         };
         Ok(vec![
             named("Sq", 1e3 * found.sq, "nm", "root mean square height"),
@@ -116,25 +116,19 @@ impl Known<'_> {
         ])
     }
 
-    fn of_cut(&self) -> Vec<NamedValue> {
+    fn of_cut(&self) -> Vec<Value> {
         let FlyCuttingConfig { nose_radius_mm, feed_um_per_rev, speed_rpm, .. } = self.config;
         let half_mm = 0.5e-3 * feed_um_per_rev;
         let scallop_nm =
             1e6 * half_mm * half_mm / (nose_radius_mm + (nose_radius_mm * nose_radius_mm - half_mm * half_mm).sqrt());
         let known =
-            |symbol: &str, number: f64, unit: &str, about: &str| NamedValue::new(symbol, number, f64::NAN, unit, about);
+            |symbol: &str, number: f64, unit: &str, about: &str| Value::new(symbol, number, f64::NAN, unit, about);
         let mut values = vec![
             known("scallop", scallop_nm, "nm", "height of the scallops of the declared cut, f²/8R"),
             known("scallop_rq", scallop_nm * (4.0_f64 / 45.0).sqrt(), "nm", "their root mean square, f²/8R·√(4/45)"),
         ];
         let [phase, std] = self.phase_um.unwrap_or([f64::NAN; 2]);
-        values.push(NamedValue::new(
-            "scallop_phase",
-            phase,
-            std,
-            "um",
-            "x at which a pass crosses y = 0, nearest to x = 0",
-        ));
+        values.push(Value::new("scallop_phase", phase, std, "um", "x at which a pass crosses y = 0, nearest to x = 0"));
         let several = self.lines.len() > 1;
         for (index, line) in self.lines.iter().enumerate() {
             let of = if several { format!("line {}", index + 1) } else { "line".into() };

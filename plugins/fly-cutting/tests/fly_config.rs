@@ -126,6 +126,6 @@ fn order_and_holes_do_not_matter() {
     }
     let reversed = separator.separate(&points).unwrap();
     for (one, other) in found.values.iter().zip(&reversed.values) {
-        assert_eq!(one.value.map(|value| format!("{value:.9}")), other.value.map(|value| format!("{value:.9}")));
+        assert_eq!(format!("{:.9}", one.value), format!("{:.9}", other.value));
     }
 }

@@ -21,7 +21,7 @@ use runout_core::{
     points::{PointColumn, PointKind::Number, Points},
     stage::{Outcome, PointSeparator, Separator},
     standards::roundness::{self, Angles, Reference},
-    summary::NamedValue,
+    summary::Value,
     table::{ColumnSpec, Figure, Measure, TableRows, TableSpec, numbers, texts},
 };
 use schemars::JsonSchema;
@@ -120,9 +120,8 @@ impl PointSeparator for Circular {
             let known = known.get(index).and_then(|known| known.at(value));
             let known =
                 known.map(|known| if symbol.starts_with(['D', 'F']) { self.of_any_length(known) } else { known });
-            let std = known.as_ref().map_or(f64::NAN, |known| known.std);
-            let mut named = NamedValue::new(&symbol, value, std, "um", about).of(&self.0.plane);
-            named.interval_95 = known.map(|known| known.interval_95);
+            let named = Value { uncertainty: known, ..Value::new(&symbol, value, f64::NAN, "um", about) };
+            let named = named.of(&self.0.plane);
             if symbol.starts_with('G') || symbol == "H" { named.key() } else { named }
         };
         Ok(Outcome {

@@ -5,7 +5,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use runout_core::{
     draws::{NORMAL_95, student_95},
-    summary::NamedValue,
+    summary::Value,
 };
 
 /// Draws of each machine measured again.
@@ -60,7 +60,7 @@ pub(crate) fn with_uncertainty(
     unit: &str,
     seed: u64,
     error: impl Fn(Machine, &mut Draw) -> Vec<f64>,
-) -> Vec<NamedValue> {
+) -> Vec<Value> {
     let mut draw = Draw(ChaCha8Rng::seed_from_u64(seed));
     let errors = [Machine::Least, Machine::Most]
         .map(|machine| (0..DRAWS).map(|_| error(machine, &mut draw)).collect::<Vec<Vec<f64>>>());
@@ -74,8 +74,10 @@ pub(crate) fn with_uncertainty(
             let at = |share: f64| computed.value - of[(share * (DRAWS - 1) as f64).round() as usize];
             interval = [interval[0].min(at(0.975)), interval[1].max(at(0.025))];
         }
-        let mut value = NamedValue::new(&computed.symbol, computed.value, std, unit, computed.about);
-        value.interval_95 = value.std.map(|_| interval.map(|end| end.max(computed.least)));
+        let mut value = Value::new(&computed.symbol, computed.value, std, unit, computed.about);
+        if let Some(known) = &mut value.uncertainty {
+            known.interval_95 = interval.map(|end| end.max(computed.least));
+        }
         if computed.is_key { value.key() } else { value }
     };
     computed.iter().enumerate().map(with).collect()

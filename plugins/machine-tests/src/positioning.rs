@@ -169,7 +169,7 @@ impl PointSeparator for Positioning {
         let mut values = with_uncertainty(&computed, deviation.unit, seed, error);
         if noise.own_std == 0.0 {
             // Copies show no uncertainty.
-            values.iter_mut().for_each(|value| (value.std, value.interval_95) = (None, None));
+            values.iter_mut().for_each(|value| value.uncertainty = None);
         }
         Ok(Outcome {
             convention: format!(

@@ -18,7 +18,7 @@ fn outcome<C: StageConfig<Stage = Separator>>(config: C, columns: &[(&str, Vec<f
 }
 
 fn value(outcome: &Outcome, symbol: &str) -> f64 {
-    outcome.values.iter().find(|value| value.symbol == symbol).unwrap().value.unwrap()
+    outcome.values.iter().find(|value| value.symbol == symbol).unwrap().value
 }
 
 fn positioning() -> PositioningConfig {
@@ -153,13 +153,13 @@ fn an_unknown_scale_is_in_the_interval() {
     }
     let found = outcome(PositioningConfig { scale_std_ppm: 1.0, ..positioning() }, &columns).unwrap();
     for symbol in ["A", "E", "M"] {
-        let [low, high] = found.values.iter().find(|value| value.symbol == symbol).unwrap().interval_95.unwrap();
+        let [low, high] = found.values.iter().find(|value| value.symbol == symbol).unwrap().interval_95().unwrap();
         // Of a normal number of 1 µm at the far end, 5 % are above 1.96 µm by their absolute value.
         assert!(low < value(&found, symbol) + 0.1 && (1.5..3.0).contains(&high), "{symbol}: {low} to {high}");
     }
     let copies: Vec<f64> = columns[1].1[..22].iter().copied().cycle().take(110).collect();
     let copied = outcome(positioning(), &[columns[0].clone(), ("deviation_um", copies)]).unwrap();
-    assert!(copied.values.iter().all(|value| value.std.is_none() && value.interval_95.is_none()));
+    assert!(copied.values.iter().all(|value| value.uncertainty.is_none()));
     assert!(copied.remarks.iter().any(|remark| remark.contains("the runs are identical")), "{:?}", copied.remarks);
     let mut odd = columns.clone();
     odd[1].1[37] += 1000.0;

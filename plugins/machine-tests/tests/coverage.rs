@@ -30,7 +30,7 @@ fn outcome(separator: Separator, columns: &[(&str, Vec<f64>)]) -> Outcome {
 
 fn number(outcome: &Outcome, symbol: &str) -> (f64, f64, [f64; 2]) {
     let value = outcome.values.iter().find(|value| value.symbol == symbol).unwrap();
-    (value.value.unwrap(), value.std.unwrap(), value.interval_95.unwrap())
+    (value.value, value.std().unwrap(), value.interval_95().unwrap())
 }
 
 /// A machine: mean deviation at a target and side, noise of an approach, and what a run is off by as a whole.
@@ -148,7 +148,7 @@ fn intervals_of_circles_hold_the_truth() {
                 let found = circle(&mut || chance.normal(), turns);
                 for (held, symbol) in held.iter_mut().zip(symbols) {
                     let (_, _, [low, high]) = number(&found, symbol);
-                    let truth = truth.values.iter().find(|value| value.symbol == symbol).unwrap().value.unwrap();
+                    let truth = truth.values.iter().find(|value| value.symbol == symbol).unwrap().value;
                     *held += usize::from((low..=high).contains(&truth));
                 }
             }

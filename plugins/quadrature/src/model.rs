@@ -17,7 +17,7 @@ use runout_core::{
     pipeline::{Context, StageConfig},
     points::{PointColumn, PointKind::Number, Points},
     stage::{LinearModel, Outcome, PointModel, PointSeparator, Separator, residual_table, separate_declared},
-    summary::NamedValue,
+    summary::Value,
     table::TableSpec,
 };
 use schemars::JsonSchema;
@@ -190,7 +190,7 @@ impl LinearModel for Quadrature {
         let mut remarks = vec![blocks];
         remarks.extend(correction.remarks());
         let values = fit.values().into_iter().map(|found| {
-            NamedValue::new(&found.value, found.number, found.std, &found.unit, "declared part of the signal").key()
+            Value::new(&found.value, found.number, found.std, &found.unit, "declared part of the signal").key()
         });
         Ok(Outcome {
             convention: ANGLE.into(),

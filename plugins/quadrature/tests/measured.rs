@@ -113,7 +113,7 @@ fn the_diagnosis_is_written_and_a_run_gives_the_declared_circle() {
     let summary = run(&pipeline(&text), None, &Silent).unwrap();
     let [radius] = &summary.values[..] else { panic!("{:?}", summary.values) };
     // The declared circle: its radius to 1e-4, from 4000 samples with an offset of 3 counts.
-    assert!(radius.symbol == "radius" && (radius.value.unwrap() - 500.0).abs() < 0.05, "{radius:?}");
+    assert!(radius.symbol == "radius" && (radius.value - 500.0).abs() < 0.05, "{radius:?}");
     assert!(summary.warnings.iter().any(|warning| warning.contains("the angle is not corrected")));
     let known = format!("{text}\ndiagnose.known = [{{ effect = 'quadrature-offset', values = {{ cosine = 3.0 }} }}]");
     assert!(diagnose(&pipeline(&known), None, &Silent).unwrap().added.is_empty());

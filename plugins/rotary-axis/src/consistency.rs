@@ -9,7 +9,7 @@ use runout_core::{
     consistency::{Check, Kind, LinearFit, Shift, Structure, Test, judge, linear, repeats::repeats},
     numerics::{least_squares::Basis, statistics::f_tail},
     points::mistakes,
-    summary::NamedValue,
+    summary::Value,
 };
 
 use crate::{
@@ -176,7 +176,7 @@ fn closings(campaign: &Campaign) -> Vec<([usize; 2], Vector3<f64>)> {
 }
 
 /// By how far each ball is off after a turn: the mean difference of its readings at commands that are a turn apart.
-pub(crate) fn closing_errors(campaign: &Campaign, std_um: f64) -> Vec<NamedValue> {
+pub(crate) fn closing_errors(campaign: &Campaign, std_um: f64) -> Vec<Value> {
     let pairs = closings(campaign);
     let of_ball = |(ball, id): (usize, &String)| {
         let own: Vec<&([usize; 2], Vector3<f64>)> =
@@ -185,7 +185,7 @@ pub(crate) fn closing_errors(campaign: &Campaign, std_um: f64) -> Vec<NamedValue
         let mean = own.iter().map(|(_, difference)| difference).sum::<Vector3<f64>>() / count;
         let about = "distance between the ball's places at the end and the beginning of a turn";
         let std = std_um * (2.0 / count).sqrt();
-        (!own.is_empty()).then(|| NamedValue::new("closing_error", 1e3 * mean.norm(), std, "um", about).of(id))
+        (!own.is_empty()).then(|| Value::new("closing_error", 1e3 * mean.norm(), std, "um", about).of(id))
     };
     campaign.balls.iter().enumerate().filter_map(of_ball).collect()
 }

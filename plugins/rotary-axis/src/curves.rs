@@ -7,7 +7,7 @@ use nalgebra::DMatrix;
 use runout_core::{
     Result,
     component_curves::{Carries, Location, Node, curves_rows, curves_table, location_rows},
-    summary::NamedValue,
+    summary::Value,
     table::{TableRows, TableSpec},
 };
 
@@ -132,13 +132,13 @@ pub(crate) fn rows(
 }
 
 /// Rows of the location errors.
-pub(crate) fn location(values: &[NamedValue], axis: Axis) -> Result<TableRows> {
+pub(crate) fn location(values: &[Value], axis: Axis) -> Result<TableRows> {
     let symbols = axis.location_symbols();
     let of_location = values.iter().filter(|value| symbols.contains(&value.symbol));
-    let one = |value: &NamedValue| Location {
+    let one = |value: &Value| Location {
         symbol: value.symbol.clone(),
-        value: value.value.unwrap_or(f64::NAN),
-        std: value.std.unwrap_or(f64::NAN),
+        value: value.value,
+        std: value.std().unwrap_or(f64::NAN),
     };
     location_rows(&of_location.map(one).collect::<Vec<_>>())
 }

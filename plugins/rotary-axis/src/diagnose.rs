@@ -11,12 +11,12 @@ use runout_core::{
     model::{
         Effect, Fit as _, Setting,
         closed_loop::{self, Settings},
-        diagnosis::{Diagnosis, Estimated, Moved, Unexplained, Verdict},
+        diagnosis::{Diagnosis, Estimated, Unexplained, Verdict},
         linear_terms::{Declared, LinearTerms, Observations, Term},
     },
     points::Points,
     stage::{Outcome, PointDiagnosis, PointModel, PointSeparator},
-    summary::NamedValue,
+    summary::moved,
 };
 
 use crate::{
@@ -323,6 +323,7 @@ impl RotaryAxis {
             }
         }
         diagnosis.moved = moved(&declared.values, &after.values);
+        diagnosis.moved.retain(|value| value.section.is_none());
         for blind in &mut diagnosis.blind_to {
             if let Some(bias) = self.bias(campaign, blind, &names, &shapes) {
                 blind.bias_per_unit = bias;
@@ -358,23 +359,4 @@ fn name(effect: &Effect) -> String {
 pub(crate) fn typical_um(campaign: &Campaign) -> f64 {
     let weights: f64 = campaign.readings.iter().map(|reading| reading.std.powi(-2)).sum();
     1e3 * (campaign.readings.len() as f64 / weights).sqrt()
-}
-
-/// Values that both results have.
-fn moved(before: &[NamedValue], after: &[NamedValue]) -> Vec<Moved> {
-    let both = before.iter().filter(|one| one.of.is_none()).filter_map(|one| {
-        let other = after.iter().find(|other| other.id() == one.id())?;
-        Some(Moved {
-            value: one.symbol.clone(),
-            section: None,
-            before: one.value?,
-            after: other.value?,
-            std: other.std,
-            unit: one.unit.clone(),
-            reference: None,
-            filter: None,
-            lost_orders: Vec::new(),
-        })
-    });
-    both.collect()
 }

@@ -18,7 +18,7 @@ use runout_core::{
     pipeline::{Context, StageConfig},
     points::{PointColumn, PointKind::Number, Points},
     stage::{LinearModel, Outcome, PointModel, PointSeparator, Separator, residual_table, separate_declared},
-    summary::NamedValue,
+    summary::Value,
     table::TableSpec,
 };
 use schemars::JsonSchema;
@@ -205,7 +205,7 @@ impl LinearModel for RTest {
         let values = fit
             .values()
             .into_iter()
-            .map(|found| NamedValue::new(&found.value, found.number, found.std, &found.unit, about).key());
+            .map(|found| Value::new(&found.value, found.number, found.std, &found.unit, about).key());
         let convention = "actual less nominal place of the ball, in machine coordinates".into();
         Ok(Outcome { convention, values: values.collect(), remarks, ..Outcome::default() })
     }

@@ -9,7 +9,7 @@ use runout_core::{
     stage::{
         Evaluable, EvaluableKind, Outcome, PointModel, PointPlan, PointSeparator, far_below_noise, residual_table,
     },
-    summary::NamedValue,
+    summary::Value,
     table::{TableRows, TableSpec, numbers, numbers_or_null, texts},
 };
 
@@ -277,7 +277,7 @@ impl RotaryAxis {
     }
 
     /// Range of each ball's coordinates as measured, and after compensation on commands that the fit has not seen.
-    fn ranges(&self, campaign: &Campaign, left_out: &[Option<Vector3<f64>>]) -> Vec<NamedValue> {
+    fn ranges(&self, campaign: &Campaign, left_out: &[Option<Vector3<f64>>]) -> Vec<Value> {
         let balls = campaign.balls.len();
         let mut before = vec![Ranges::none(); balls];
         let mut after = vec![Ranges::none(); balls];
@@ -300,7 +300,7 @@ impl RotaryAxis {
             for (when, ranges, about) in &what {
                 for (coordinate, name) in ["dx", "dy", "dz"].into_iter().enumerate() {
                     let number = ranges[ball].um(coordinate);
-                    values.push(NamedValue::new(&format!("{name}_range_{when}"), number, f64::NAN, "um", about).of(id));
+                    values.push(Value::new(&format!("{name}_range_{when}"), number, f64::NAN, "um", about).of(id));
                 }
             }
         }
@@ -367,8 +367,8 @@ impl RotaryAxis {
 }
 
 /// The four location errors as values, offsets before tilts, in the order of their symbols.
-pub(crate) fn location_values(axis: Axis, found: [Estimate; 4]) -> Vec<NamedValue> {
-    let mut values: Vec<NamedValue> = axis
+pub(crate) fn location_values(axis: Axis, found: [Estimate; 4]) -> Vec<Value> {
+    let mut values: Vec<Value> = axis
         .location_symbols()
         .into_iter()
         .zip(found)
@@ -379,7 +379,7 @@ pub(crate) fn location_values(axis: Axis, found: [Estimate; 4]) -> Vec<NamedValu
             } else {
                 (1e6, "urad", "location error: tilt of the axis' average line (ISO 230-1)")
             };
-            NamedValue::new(&symbol, scale * one.value, scale * one.std, unit, about).key()
+            Value::new(&symbol, scale * one.value, scale * one.std, unit, about).key()
         })
         .collect();
     values.sort_by(|a, b| (&b.unit == "um", &a.symbol).cmp(&(&a.unit == "um", &b.symbol)));

@@ -349,7 +349,7 @@ fn compensation_removes_most_on_commands_that_the_fit_has_not_seen() {
     for ball in ["P1", "P2", "P3"] {
         let range = |symbol: &str| {
             let value = found.values.iter().find(|value| value.symbol == symbol && value.of.as_deref() == Some(ball));
-            value.unwrap().value.unwrap()
+            value.unwrap().value
         };
         for coordinate in ["dx", "dy"] {
             let [before, after] = ["before", "after"].map(|when| range(&format!("{coordinate}_range_{when}")));

@@ -6,7 +6,7 @@ use runout_core::{
     pipeline::{Context, StageConfig},
     points::{PointColumn, Points},
     stage::{Outcome, PointSeparator, Separator},
-    summary::NamedValue,
+    summary::Value,
     table::{ColumnSpec, Figure, Measure, TableRows, TableSpec, counts, numbers, numbers_or_null, texts},
 };
 use schemars::JsonSchema;
@@ -258,9 +258,9 @@ impl Solution {
         rows.into_iter().map(|(spec, columns)| Ok(TableRows { rows: spec.rows(columns)?, table: spec.name })).collect()
     }
 
-    fn values(&self) -> Vec<NamedValue> {
+    fn values(&self) -> Vec<Value> {
         let exact =
-            |symbol: &str, number: f64, unit: &str, about: &str| NamedValue::new(symbol, number, f64::NAN, unit, about);
+            |symbol: &str, number: f64, unit: &str, about: &str| Value::new(symbol, number, f64::NAN, unit, about);
         let mut values = Vec::new();
         for (index, mode) in self.at_rest.iter().enumerate() {
             let about = "natural frequency at rest";

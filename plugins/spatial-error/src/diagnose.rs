@@ -8,11 +8,11 @@ use runout_core::{
     model::{
         Effect,
         closed_loop::Settings,
-        diagnosis::{Added, BiasPerUnit, Blind, Diagnosis, Level, Moved, Refused, Step, Unexplained, Verdict},
+        diagnosis::{Added, BiasPerUnit, Blind, Diagnosis, Level, Refused, Step, Unexplained, Verdict},
     },
     points::Points,
-    stage::{Outcome, PointDiagnosis, PointModel},
-    summary::NamedValue,
+    stage::{PointDiagnosis, PointModel},
+    summary::moved,
 };
 
 use crate::{
@@ -157,7 +157,7 @@ impl PointModel for SpatialError {
                 .collect(),
             after: levels[1].clone(),
             nothing_separated: false,
-            moved: moved(&declared_outcome, &outcome),
+            moved: moved(&declared_outcome.values, &outcome.values),
             unexplained,
             blind_to: {
                 let known: Vec<usize> =
@@ -336,25 +336,4 @@ fn blind(
         }
     }
     blind
-}
-
-/// Values that both results have.
-fn moved(before: &Outcome, after: &Outcome) -> Vec<Moved> {
-    let number = |values: &[NamedValue], like: &NamedValue| {
-        values.iter().find(|one| one.id() == like.id()).and_then(|one| one.value)
-    };
-    let of = |value: &NamedValue| {
-        Some(Moved {
-            value: value.symbol.clone(),
-            section: value.of.clone(),
-            before: number(&before.values, value)?,
-            after: value.value?,
-            std: value.std,
-            unit: value.unit.clone(),
-            reference: None,
-            filter: None,
-            lost_orders: Vec::new(),
-        })
-    };
-    after.values.iter().filter_map(of).collect()
 }

@@ -2,7 +2,7 @@
 
 use runout_core::{
     consistency::{Check, Test, refuted_by},
-    summary::NamedValue,
+    summary::Value,
 };
 
 use crate::{
@@ -17,7 +17,7 @@ use crate::{
 };
 
 impl Conclusion<'_> {
-    pub(crate) fn values(&self, queries: &[At], left_out: &[[LeftOut; 3]], checks: &[Check]) -> Vec<NamedValue> {
+    pub(crate) fn values(&self, queries: &[At], left_out: &[[LeftOut; 3]], checks: &[Check]) -> Vec<Value> {
         let mut values = self.of_trend();
         for (axis, component) in COMPONENTS.into_iter().enumerate() {
             // A nugget above the noise refutes no number: it is one of them.
@@ -32,7 +32,7 @@ impl Conclusion<'_> {
         values
     }
 
-    fn of_trend(&self) -> Vec<NamedValue> {
+    fn of_trend(&self) -> Vec<Value> {
         let solution = self.solution;
         let mut values = Vec::new();
         let trend_std = solution.trend_std(self.campaign);
@@ -49,17 +49,17 @@ impl Conclusion<'_> {
                 }
                 _ => continue,
             };
-            values.push(NamedValue::new(symbol, number, std, wanted.unit(), about));
+            values.push(Value::new(symbol, number, std, wanted.unit(), about));
         }
         for (id, target, term) in self.names {
             let [number, std] = fitted(*term);
-            values.push(NamedValue::new(id, number, std, term.unit(), "effect that was added").of(target));
+            values.push(Value::new(id, number, std, term.unit(), "effect that was added").of(target));
         }
         values
     }
 
     /// Covariance and noise of a component; null where it was not measured.
-    fn of_covariance(&self, axis: usize) -> Vec<NamedValue> {
+    fn of_covariance(&self, axis: usize) -> Vec<Value> {
         let (campaign, solution) = (self.campaign, self.solution);
         let field = solution.measured.iter().position(|measured| *measured == axis);
         // d(exp θ) = exp θ · dθ.
@@ -73,7 +73,7 @@ impl Conclusion<'_> {
         let covariance = field.map(|field| &solution.covariances[field]);
         let mut values = Vec::new();
         let mut add = |symbol: &str, number: f64, std: f64, unit: &str, about: &str| {
-            values.push(NamedValue::new(symbol, number, std, unit, about).of(COMPONENTS[axis]));
+            values.push(Value::new(symbol, number, std, unit, about).of(COMPONENTS[axis]));
         };
         let sill = covariance.map_or(f64::NAN, |covariance| covariance.sill_um);
         add("sill", sill, sill * relative_std(0), "um", "standard deviation of the field");
@@ -100,13 +100,13 @@ impl Conclusion<'_> {
     }
 }
 
-fn of_left_out(axis: usize, left_out: &[[LeftOut; 3]]) -> [NamedValue; 2] {
+fn of_left_out(axis: usize, left_out: &[[LeftOut; 3]]) -> [Value; 2] {
     let each = || left_out.iter().map(|place| place[axis]).filter(|one| one.std_um.is_finite());
     let count = each().count() as f64;
     let rms = (each().map(|one| one.residual_um.powi(2)).sum::<f64>() / count).sqrt();
     let chi2 = each().map(|one| (one.residual_um / one.std_um).powi(2)).sum::<f64>() / count;
     let value = |symbol: &str, number: f64, unit: &str, about: &str| {
-        NamedValue::new(symbol, number, f64::NAN, unit, about).of(COMPONENTS[axis])
+        Value::new(symbol, number, f64::NAN, unit, about).of(COMPONENTS[axis])
     };
     [
         value("left_out_rms", rms, "um", "root mean square of what the other places do not predict"),
@@ -115,7 +115,7 @@ fn of_left_out(axis: usize, left_out: &[[LeftOut; 3]]) -> [NamedValue; 2] {
 }
 
 /// Error without the placement before and after compensation: expected squares, with the variance of the predictions.
-fn of_compensation(queries: &[At]) -> [NamedValue; 2] {
+fn of_compensation(queries: &[At]) -> [Value; 2] {
     let known = || queries.iter().filter_map(|query| Some((query, query.correction.as_ref()?)));
     let rms = |squares: f64| (squares / known().count() as f64).sqrt();
     let expected = |mean_um: [f64; 3], at: &At| -> f64 {
@@ -124,7 +124,7 @@ fn of_compensation(queries: &[At]) -> [NamedValue; 2] {
     };
     let before = rms(known().map(|(query, _)| expected(query.error_um, query)).sum());
     let after = rms(known().map(|(query, correction)| expected(correction.remains_um, query)).sum());
-    let value = |symbol: &str, number: f64, about: &str| NamedValue::new(symbol, number, f64::NAN, "um", about).key();
+    let value = |symbol: &str, number: f64, about: &str| Value::new(symbol, number, f64::NAN, "um", about).key();
     [
         value(
             "error_rms",
@@ -140,10 +140,10 @@ fn of_compensation(queries: &[At]) -> [NamedValue; 2] {
 }
 
 /// Squareness errors, and the error over the measured volume before and after compensation by the curves.
-pub(crate) fn of_curves(found: &ComponentFit) -> Vec<NamedValue> {
+pub(crate) fn of_curves(found: &ComponentFit) -> Vec<Value> {
     let of_location = found.location.iter().map(|error| {
         let about = "squareness error between the least-squares lines of two axes (ISO 230-1)";
-        NamedValue::new(&error.symbol, error.value, error.std, "urad", about)
+        Value::new(&error.symbol, error.value, error.std, "urad", about)
     });
     let volumetric = [
         (
@@ -162,8 +162,7 @@ pub(crate) fn of_curves(found: &ComponentFit) -> Vec<NamedValue> {
             "of these what no axis can take away: no chain of rigid bodies has this error",
         ),
     ];
-    let volumetric = volumetric
-        .into_iter()
-        .map(|(symbol, [value, std], about)| NamedValue::new(symbol, value, std, "um", about).key());
+    let volumetric =
+        volumetric.into_iter().map(|(symbol, [value, std], about)| Value::new(symbol, value, std, "um", about).key());
     of_location.chain(volumetric).collect()
 }

@@ -135,7 +135,7 @@ fn curves_are_those_of_the_axes_within_their_uncertainty() {
             let found = value(&outcome, symbol, None);
             let std = found.std.unwrap();
             assert!(std < 3.0, "{symbol} ± {std}");
-            assert!((found.value.unwrap() - truth).abs() < 4.0 * std, "{symbol}: {found:?}, is {truth}");
+            assert!((found.value - truth).abs() < 4.0 * std, "{symbol}: {found:?}, is {truth}");
         }
     }
     let chi2: f64 = squares / count;
@@ -220,9 +220,9 @@ fn the_machine_is_left_with_the_error_that_is_predicted() {
         let outcome = separator("curves = { pitch_mm = [100.0, 100.0, 87.5] }").separate(&made.points()).unwrap();
         let found = curves(&outcome);
         let predicted = value(&outcome, "volumetric_rms_after", None);
-        let (expected, std) = (predicted.value.unwrap(), predicted.std.unwrap());
-        let beyond = value(&outcome, "volumetric_rms_beyond_axes", None).value.unwrap();
-        let before = value(&outcome, "volumetric_rms", None).value.unwrap();
+        let (expected, std) = (predicted.value, predicted.std().unwrap());
+        let beyond = value(&outcome, "volumetric_rms_beyond_axes", None).value;
+        let before = value(&outcome, "volumetric_rms", None).value;
         let left = compensated(&made, &found, 1.0);
         let reversed = compensated(&made, &found, -1.0);
         println!(

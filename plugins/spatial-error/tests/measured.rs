@@ -59,7 +59,7 @@ fn a_component_that_was_not_measured_changes_no_other() {
         for symbol in ["sill", "nugget", "noise", "left_out_chi2"] {
             assert_eq!(value(&outcome, symbol, Some("dy")).value, None, "{kind} {symbol}");
         }
-        assert!(value(&outcome, "remains_rms", None).value.unwrap().is_finite());
+        assert!(value(&outcome, "remains_rms", None).value.is_finite());
         let said = &outcome.checks[0];
         assert!(
             said.finding.contains("`dy_um`") && said.finding.contains("not measured") && !said.refutes(),
@@ -146,9 +146,9 @@ fn what_is_not_smooth_remains_and_is_no_noise() {
         assert_eq!((found.diagnosis.verdict, found.diagnosis.added.len()), (Verdict::Unexplained, 0));
         let said = &found.diagnosis.unexplained[0].place;
         assert!(said.contains("from place to place"), "{said}");
-        let remains = value(&found.after, "remains_rms", None).value.unwrap();
+        let remains = value(&found.after, "remains_rms", None).value;
         assert!((0.85..1.25).contains(&(remains / expected)), "{query}: {remains}");
-        let error = value(&found.after, "error_rms", None).value.unwrap();
+        let error = value(&found.after, "error_rms", None).value;
         assert!(error > remains, "{error} {remains}");
     }
 }

@@ -5,7 +5,7 @@ use runout_core::{
     consistency::Check,
     stage::{Evaluable, OpenProfile, Outcome},
     standards::open_errors::OpenErrors,
-    summary::NamedValue,
+    summary::Value,
     table::{ColumnSpec, Figure, Measure, TableRows, TableSpec, numbers},
 };
 
@@ -117,30 +117,24 @@ impl Straightness {
         [profile("part", &self.part_um, part), profile("slide", &self.slide_um, slide)]
     }
 
-    fn values(&self) -> Vec<NamedValue> {
+    fn values(&self) -> Vec<Value> {
         let of = |name: &str, std_um: &[f64]| {
             let each = "standard uncertainty of the deviation at one position, rms over the positions";
-            NamedValue::new("std", rms(std_um), f64::NAN, "um", each).of(name)
+            Value::new("std", rms(std_um), f64::NAN, "um", each).of(name)
         };
         let repeatability = "standard deviation of one trace at one position, rms over the positions";
         let mut values = vec![of("part", &self.part_std_um), of("slide", &self.slide_std_um)];
-        values.push(NamedValue::new("repeatability", self.repeatability_um, f64::NAN, "um", repeatability));
+        values.push(Value::new("repeatability", self.repeatability_um, f64::NAN, "um", repeatability));
         let end = |z_mm: Option<&f64>| z_mm.copied().unwrap_or(f64::NAN);
-        values.push(NamedValue::new(
+        values.push(Value::new(
             "first-position",
             end(self.z_mm.first()),
             f64::NAN,
             "mm",
             "first position along the axis",
         ));
-        values.push(NamedValue::new(
-            "last-position",
-            end(self.z_mm.last()),
-            f64::NAN,
-            "mm",
-            "last position along the axis",
-        ));
-        values.push(NamedValue::new("positions", self.z_mm.len() as f64, f64::NAN, "", "number of positions"));
+        values.push(Value::new("last-position", end(self.z_mm.last()), f64::NAN, "mm", "last position along the axis"));
+        values.push(Value::new("positions", self.z_mm.len() as f64, f64::NAN, "", "number of positions"));
         values
     }
 

@@ -6,12 +6,12 @@ use runout_core::{
     model::{
         Effect, Fit, Setting,
         closed_loop::{self, Closed, Settings},
-        diagnosis::{BiasPerUnit, Blind, Diagnosis, Moved, Unexplained, Verdict},
+        diagnosis::{BiasPerUnit, Blind, Diagnosis, Unexplained, Verdict},
         linear_terms::{Declared, LinearFit, LinearTerms, Observations, Term},
     },
     points::Points,
     stage::{Outcome, PointDiagnosis, PointModel},
-    summary::NamedValue,
+    summary::{Value, moved},
 };
 
 use crate::{
@@ -184,7 +184,7 @@ impl TouchProbe {
         }
         let (_, declared) = self.fitted_outcome(prepared, missing, &Content::declared(), &readings)?;
         let (_, mut after) = self.fitted_outcome(prepared, missing, &content(missing, &diagnosis), &readings)?;
-        diagnosis.moved = moved(&declared, &after);
+        diagnosis.moved = moved(&declared.values, &after.values);
         self.of_mean(&mut diagnosis, &after);
         diagnosis.consistency.clone_from(&after.checks);
         if diagnosis.consistency.iter().any(Check::bars_verdict) && diagnosis.verdict != Verdict::Unexplained {
@@ -226,7 +226,7 @@ impl TouchProbe {
                 (0.5 * arm * scale).abs()
             ));
         }
-        let mean = after.values.iter().find(|value| value.symbol == "pretravel_mean").and_then(|value| value.value);
+        let mean = after.values.iter().find(|value| value.symbol == "pretravel_mean").and_then(Value::number);
         if let (Some(change), Some(mean)) = (drift, mean) {
             diagnosis.warnings.push(format!(
                 "`pretravel_mean` is the mean of those at the first and the last touch; with the drift of the radius by {change:.2} µm it is \
@@ -329,25 +329,4 @@ fn in_order(terms: &LinearTerms, prepared: &Prepared, fit: &LinearFit) -> Vec<f6
         left[*place] = value * prepared.weights.std_um[*place] / scale;
     }
     left
-}
-
-/// Values that both results have.
-fn moved(before: &Outcome, after: &Outcome) -> Vec<Moved> {
-    let number = |values: &[NamedValue], like: &NamedValue| {
-        values.iter().find(|one| one.id() == like.id()).and_then(|one| one.value)
-    };
-    let of = |value: &NamedValue| {
-        Some(Moved {
-            value: value.symbol.clone(),
-            section: value.of.clone(),
-            before: number(&before.values, value)?,
-            after: value.value?,
-            std: value.std,
-            unit: value.unit.clone(),
-            reference: None,
-            filter: None,
-            lost_orders: Vec::new(),
-        })
-    };
-    after.values.iter().filter_map(of).collect()
 }

@@ -7,7 +7,7 @@ use runout_core::{
     model::diagnosis::LostOrders,
     separation::{Quantity, Residual, SectionAt, Separation},
     stage::{Evaluable, Form, Outcome, far_below_noise},
-    summary::NamedValue,
+    summary::Value,
     table::{TableRows, counts, flags, numbers},
 };
 
@@ -140,11 +140,11 @@ impl Found<'_> {
         Some([self.fit.solved.coefficients[place], std_um])
     }
 
-    fn values(&self, lobes: &[Lobe]) -> Vec<NamedValue> {
+    fn values(&self, lobes: &[Lobe]) -> Vec<Value> {
         let [mean, std] = self.mean().unwrap_or([f64::NAN; 2]);
         let about = "mean pre-travel and stylus, over the time of the campaign: reading less ring radius; holds the error of the ring's radius, \
              and a scale error common to X and Y, one to one";
-        let mut values = vec![NamedValue::new("pretravel_mean", mean, std, "um", about).key()];
+        let mut values = vec![Value::new("pretravel_mean", mean, std, "um", about).key()];
         let Ranges { before, after, without_form, by_repeats, .. } = self.ranges;
         let held = if by_repeats { "a repeat" } else { "touches" };
         let of_ranges = [
@@ -158,14 +158,14 @@ impl Found<'_> {
         ];
         for (symbol, range, about) in of_ranges {
             let about = format!("range, mean over passes: {about}");
-            values.push(NamedValue::new(symbol, range.um, range.std_um, "um", &about).key());
+            values.push(Value::new(symbol, range.um, range.std_um, "um", &about).key());
         }
         for lobe in lobes {
             let of = |number: f64| if lobe.observable { number } else { f64::NAN };
             let [along, across] = lobe.std_um();
             let order = lobe.order;
             let about = format!("amplitude of lobing of order {order}");
-            values.push(NamedValue::new(
+            values.push(Value::new(
                 &format!("lobe_{order}_amplitude"),
                 of(lobe.amplitude_um()),
                 of(along),
@@ -178,7 +178,7 @@ impl Found<'_> {
             );
             let evident = |number: f64| if lobe.evident { of(number) } else { f64::NAN };
             let std = (across / lobe.amplitude_um()).to_degrees();
-            values.push(NamedValue::new(
+            values.push(Value::new(
                 &format!("lobe_{order}_phase"),
                 evident(lobe.phase_deg()),
                 evident(std),
@@ -195,7 +195,7 @@ impl Found<'_> {
                     [moved + self.fit.solved.coefficients[place], self.fit.covariance(place, place).sqrt()]
                 });
                 let about = "centre of the ring, from the nominal one; contains lobing of order 1";
-                values.push(NamedValue::new(symbol, number, std, "um", about).of(&self.config.setups[*setup].id));
+                values.push(Value::new(symbol, number, std, "um", about).of(&self.config.setups[*setup].id));
             }
         }
         let about = match self.weights.noise {
@@ -212,7 +212,7 @@ impl Found<'_> {
                 (noise, noise / (2.0 * self.fit.solved.dof as f64).sqrt())
             }
         };
-        values.push(NamedValue::new("touch_std", noise, std, "um", &about));
+        values.push(Value::new("touch_std", noise, std, "um", &about));
         values
     }
 

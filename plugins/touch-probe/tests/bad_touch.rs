@@ -29,7 +29,7 @@ fn one_bad_touch_is_named_and_does_not_make_the_noise() {
         let clean = config(&scenario, 9, None).separate(&points).unwrap();
         column(&mut points, "radius_mm")[row] += 1e-3 * off_um;
         let found = config(&scenario, 9, None).separate(&points).unwrap();
-        let [before, after] = [&clean, &found].map(|outcome| value(outcome, "touch_std").value.unwrap());
+        let [before, after] = [&clean, &found].map(|outcome| value(outcome, "touch_std").value);
         println!("{seed}: noise {before:.3} to {after:.3} µm, {:?}", said(&found));
         assert!((after / before - 1.0).abs() < 0.02, "{seed}: {before} {after}");
         assert!(
@@ -38,8 +38,8 @@ fn one_bad_touch_is_named_and_does_not_make_the_noise() {
             said(&found)
         );
         let mean = value(&found, "pretravel_mean");
-        let off = (mean.value.unwrap() - lobing(&scenario).mean_um).abs();
-        assert!(off < 2.5 * mean.std.unwrap() && mean.std.unwrap() < 0.5, "{seed}: {off} {mean:?}");
+        let off = (mean.value - lobing(&scenario).mean_um).abs();
+        assert!(off < 2.5 * mean.std().unwrap() && mean.std().unwrap() < 0.5, "{seed}: {off} {mean:?}");
     }
 }
 

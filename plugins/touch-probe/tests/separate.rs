@@ -28,12 +28,12 @@ fn intervals_hold_the_truth_as_often_as_they_say() {
         for order in [3, 6] {
             let found = value(&outcome, &format!("lobe_{order}_amplitude"));
             all[1] += 1;
-            let off = found.value.unwrap() - truth.amplitude(order);
-            inside[1] += usize::from(off.abs() < 1.96 * found.std.unwrap());
+            let off = found.value - truth.amplitude(order);
+            inside[1] += usize::from(off.abs() < 1.96 * found.std().unwrap());
         }
         let mean = value(&outcome, "pretravel_mean");
         all[2] += 1;
-        inside[2] += usize::from((mean.value.unwrap() - truth.mean_um).abs() < 1.96 * mean.std.unwrap());
+        inside[2] += usize::from((mean.value - truth.mean_um).abs() < 1.96 * mean.std().unwrap());
     }
     for ((inside, all), what) in inside.iter().zip(all).zip(["pre-travel", "amplitudes", "mean"]) {
         let share = 100.0 * *inside as f64 / all as f64;
@@ -52,8 +52,8 @@ fn the_range_after_compensation_beats_a_table() {
         scenario.repeats = 4;
         let touched = scenario.touched();
         let outcome = config(&scenario, 15, None).separate(&touched.points()).unwrap();
-        before += value(&outcome, "range_before").value.unwrap() / SEEDS as f64;
-        after += value(&outcome, "range_after_without_form").value.unwrap() / SEEDS as f64;
+        before += value(&outcome, "range_before").value / SEEDS as f64;
+        after += value(&outcome, "range_after_without_form").value / SEEDS as f64;
         let lobing = table(&outcome, "lobing");
         numbers += 2 * runout_core::table::RecordBatch::column_by_name(&lobing, "evident")
             .map(|flags| support::flags(flags).into_iter().filter(|flag| *flag).count())
@@ -110,7 +110,7 @@ fn correlated_touches_are_remarked_and_widen() {
                 outcome.checks.iter().any(|check| check.finding.contains("depend on each other along time")),
             );
             let mean = outcome.values.iter().find(|value| value.symbol == "pretravel_mean").unwrap();
-            squares[kind] += ((mean.value.unwrap() - truth) / mean.std.unwrap()).powi(2);
+            squares[kind] += ((mean.value - truth) / mean.std().unwrap()).powi(2);
         }
     }
     let chi2 = squares.map(|sum| sum / CAMPAIGNS as f64);

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use runout_core::{Error, Result, pipeline::Context, stage::PointSeparator, summary::NamedValue};
+use runout_core::{Error, Result, pipeline::Context, stage::PointSeparator, summary::Value};
 use runout_spatial_error::{Query, SpatialErrorConfig};
 
 use super::{
@@ -59,8 +59,8 @@ fn one(chance: &mut Chance) -> Result<Placed> {
         rz,
     ];
     let of = |symbol: &str, truth: f64| {
-        let found: Option<&NamedValue> = values.iter().find(|value| value.symbol == symbol);
-        found.and_then(|value| value.value.zip(value.std)).map_or(f64::NAN, |(value, std)| (value - truth) / std)
+        let found: Option<&Value> = values.iter().find(|value| value.symbol == symbol);
+        found.and_then(|value| value.number().zip(value.std())).map_or(f64::NAN, |(value, std)| (value - truth) / std)
     };
     let known = Known::new(&scenario, &made)
         .ok_or_else(|| Error::new("invert", "the true covariance", "it is singular"))?

@@ -25,7 +25,7 @@ pub(crate) fn section(page: &mut Page, stations: &[StationSummary]) {
         }
     }
     let line = stations.iter().find_map(|station| station.motion_along_deg);
-    let about = &first.reference;
+    let about = first.reference.as_deref().unwrap_or_default();
     let named = |direction: &str| match line {
         _ if is_axial(direction) && about != "PC" => format!("{direction} (PC)"),
         Some(line_deg) => direction.replace("along", &format!("along {line_deg}°")),

@@ -50,7 +50,7 @@ pub(crate) fn values(page: &mut Page, stations: &[StationSummary]) {
                 if stations.len() > 1 { station.station.clone() } else { String::new() },
                 section.section.clone(),
                 value.symbol.clone(),
-                value.reference.clone(),
+                value.reference.clone().unwrap_or_default(),
                 with_uncertainty(value),
                 unit(&value.unit),
             ]);

@@ -27,21 +27,9 @@ fn capture(setup: &str, rejected: usize) -> CaptureSummary {
 
 fn section(id: &str, z_mm: f64) -> SectionSummary {
     let value = |symbol: &str, value, std: Option<f64>| Value {
-        symbol: symbol.into(),
-        unit: "um".into(),
-        value,
-        source: String::new(),
         band_upr: [2, 80],
-        lost_orders: vec![],
-        weakened_above_upr: None,
-        absent_above_upr: None,
-        no_uncertainty: None,
-        raised_by_noise: None,
-        refuted_by: None,
-        filter: "none".into(),
-        reference: "LSCI".into(),
-        coverage: 1.0,
         uncertainty: std.map(|std| Uncertainty::new(std, [value - 2.0 * std, value + 2.0 * std], 400)),
+        ..Value::referred(symbol, value, "um", "", "LSCI")
     };
     SectionSummary {
         section: id.into(),
@@ -55,21 +43,9 @@ fn section(id: &str, z_mm: f64) -> SectionSummary {
 
 fn motion_values(size: f64) -> Vec<Value> {
     let value = |symbol: &str, unit: &str, reference: &str, value, std: Option<f64>| Value {
-        symbol: symbol.into(),
-        unit: unit.into(),
-        value,
-        source: String::new(),
         band_upr: [2, 80],
-        lost_orders: vec![],
-        weakened_above_upr: None,
-        absent_above_upr: None,
-        no_uncertainty: None,
-        raised_by_noise: None,
-        refuted_by: None,
-        filter: "none".into(),
-        reference: reference.into(),
-        coverage: 1.0,
         uncertainty: std.map(|std| Uncertainty::new(std, [value, value], 0)),
+        ..Value::referred(symbol, value, unit, "", reference)
     };
     vec![
         value("synchronous-radial-x", "um", "LSC", 3.2 * size, Some(0.004)),

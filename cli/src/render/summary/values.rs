@@ -17,10 +17,15 @@ use crate::render::{
 pub(crate) fn part(page: &mut Page, summary: &Summary) {
     let Some(part) = &summary.part else { return };
     let mut table = Table::new(2, ["value", "reference", ""]);
-    let shown = |value: &&Value| ["CYLt", "Sa", "Sz"].contains(&&*value.symbol) && value.filter == "none";
+    let shown =
+        |value: &&Value| ["CYLt", "Sa", "Sz"].contains(&&*value.symbol) && value.filter.as_deref() == Some("none");
     for value in part.values.iter().filter(shown) {
         let number = with_uncertainty(value) + &lacking(&value.lost_orders);
-        table.row([format!("{} {}", value.symbol, unit(&value.unit)), value.reference.clone(), number]);
+        table.row([
+            format!("{} {}", value.symbol, unit(&value.unit)),
+            value.reference.clone().unwrap_or_default(),
+            number,
+        ]);
     }
     page.headed_table("The whole part", &table);
 }
@@ -100,8 +105,8 @@ mod tests {
         LimitValue {
             station: None,
             section: None,
-            reference: "MZCI".into(),
-            filter: "none".into(),
+            reference: Some("MZCI".into()),
+            filter: Some("none".into()),
             band_upr: [2, 63],
             value: 0.5 * (interval_95[0] + interval_95[1]),
             interval_95: Some(interval_95),

@@ -90,8 +90,8 @@ impl ErrorMotion<'_> {
         let rms_known = bounded(between_setups(&each_rms, std.hypot(across_rms)), 0.5 * plot.bound);
         let total_rms = root_mean_square(&each_rms);
         Some([
-            Self::axial_value(format!("total-{id}"), &total, direction, plot, z_mm, all.1 - all.0, range_known),
-            Self::axial_value(format!("total-{id}-rms"), &rms_what, direction, plot, z_mm, total_rms, rms_known),
+            Self::axial_value(&format!("total-{id}"), &total, direction, plot, z_mm, all.1 - all.0, range_known),
+            Self::axial_value(&format!("total-{id}-rms"), &rms_what, direction, plot, z_mm, total_rms, rms_known),
         ])
     }
 
@@ -107,7 +107,7 @@ impl ErrorMotion<'_> {
 
     #[allow(clippy::too_many_arguments, reason = "what differs between the values of one plot")]
     fn axial_value(
-        symbol: String,
+        symbol: &str,
         what: &str,
         direction: Direction,
         plot: &Synchronous,
@@ -116,21 +116,16 @@ impl ErrorMotion<'_> {
         uncertainty: Option<Uncertainty>,
     ) -> Value {
         Value {
-            symbol,
-            unit: unit(direction).into(),
-            value,
-            source: format!("{STANDARD}, {what}, {}", described_within(direction, plot, z_mm)),
             band_upr: plot.band,
             lost_orders: plot.lost.clone(),
-            weakened_above_upr: None,
-            absent_above_upr: None,
-            no_uncertainty: None,
-            filter: "none".into(),
-            reference: centre_of_chart().symbol().into(),
-            coverage: 1.0,
             uncertainty,
-            raised_by_noise: None,
-            refuted_by: None,
+            ..Value::referred(
+                symbol,
+                value,
+                unit(direction),
+                &format!("{STANDARD}, {what}, {}", described_within(direction, plot, z_mm)),
+                centre_of_chart().symbol(),
+            )
         }
     }
 }

@@ -194,25 +194,20 @@ impl ErrorMotion<'_> {
         }
         let id = self.id(direction);
         Some(Value {
-            symbol: format!("total-{id}{WITH_FUNDAMENTAL}"),
-            unit: unit(direction).into(),
-            value: all.1 - all.0,
-            source: format!(
-                "{STANDARD}, total error motion value with the part of 1/rev that turns against the spindle, {}, {}",
-                over(spreads),
-                described(direction, z_mm, XYZ)
-            ),
             band_upr: plot.band,
             lost_orders: plot.lost.clone(),
-            weakened_above_upr: None,
-            absent_above_upr: None,
-            no_uncertainty: None,
-            filter: "none".into(),
-            reference: Centre::PolarChart.symbol().into(),
-            coverage: 1.0,
             uncertainty: bounded(between_setups(&each, self.carried(direction, spreads, widest)), plot.bound),
-            raised_by_noise: None,
-            refuted_by: None,
+            ..Value::referred(
+                &format!("total-{id}{WITH_FUNDAMENTAL}"),
+                all.1 - all.0,
+                unit(direction),
+                &format!(
+                    "{STANDARD}, total error motion value with the part of 1/rev that turns against the spindle, {}, {}",
+                    over(spreads),
+                    described(direction, z_mm, XYZ)
+                ),
+                Centre::PolarChart.symbol(),
+            )
         })
     }
 
@@ -240,26 +235,20 @@ impl ErrorMotion<'_> {
         let alone = if each.len() < 2 { "; one setup leaves its uncertainty unknown" } else { "" };
         let id = self.id(direction);
         let described = described(direction, z_mm, XYZ);
-        let value = |symbol, what: &str, value, uncertainty| Value {
-            symbol,
-            unit: unit(direction).into(),
-            value,
-            source: format!(
-                "{STANDARD}, asynchronous error motion value, {described}, {what} of {}; with the sensors' noise, \
-                 {gain:.3}{gain_unit} times that of one{alone}",
-                over(spreads),
-            ),
+        let value = |symbol: String, what: &str, value, uncertainty| Value {
             band_upr: [0, spreads.iter().map(|spread| spread.angles.saturating_sub(1) / 2).min().unwrap_or(0)],
-            lost_orders: Vec::new(),
-            weakened_above_upr: None,
-            absent_above_upr: None,
-            no_uncertainty: None,
-            filter: "none".into(),
-            reference: "turns at one angle".into(),
-            coverage: 1.0,
             uncertainty,
-            raised_by_noise: None,
-            refuted_by: None,
+            ..Value::referred(
+                &symbol,
+                value,
+                unit(direction),
+                &format!(
+                    "{STANDARD}, asynchronous error motion value, {described}, {what} of {}; with the sensors' noise, \
+                     {gain:.3}{gain_unit} times that of one{alone}",
+                    over(spreads),
+                ),
+                "turns at one angle",
+            )
         };
         let [std, rms_std] = [widest, rms_across].map(|across| self.carried(direction, spreads, across));
         [

@@ -183,21 +183,15 @@ pub(super) fn fundamental_along(id: &str, value: f64, known: Option<Uncertainty>
 
 fn fundamental(id: &str, direction: Direction, what: &str, value: f64, uncertainty: Option<Uncertainty>) -> Value {
     Value {
-        symbol: format!("fundamental-{id}"),
-        unit: unit(direction).into(),
-        value,
-        source: format!("{STANDARD}, fundamental error motion {what}"),
         band_upr: [1, 1],
-        lost_orders: Vec::new(),
-        weakened_above_upr: None,
-        absent_above_upr: None,
-        no_uncertainty: None,
-        filter: "none".into(),
-        reference: centre_of_chart().symbol().into(),
-        coverage: 1.0,
         uncertainty,
-        raised_by_noise: None,
-        refuted_by: None,
+        ..Value::referred(
+            &format!("fundamental-{id}"),
+            value,
+            unit(direction),
+            &format!("{STANDARD}, fundamental error motion {what}"),
+            centre_of_chart().symbol(),
+        )
     }
 }
 

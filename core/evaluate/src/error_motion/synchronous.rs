@@ -110,21 +110,11 @@ impl Synchronous {
             0.5 * self.bound,
         );
         [range, rms].map(|(symbol, what, Measured { value, known, raised_by_noise }, bound)| Value {
-            symbol,
-            unit: unit.to_owned(),
-            value: *value,
-            source: format!("{STANDARD}, {what}, {described}"),
             band_upr: self.band,
             lost_orders: self.lost.clone(),
-            weakened_above_upr: None,
-            absent_above_upr: None,
-            no_uncertainty: None,
-            filter: "none".into(),
-            reference: centre.symbol().into(),
-            coverage: 1.0,
             uncertainty: bounded(known.clone(), bound),
             raised_by_noise: *raised_by_noise,
-            refuted_by: None,
+            ..Value::referred(&symbol, *value, unit, &format!("{STANDARD}, {what}, {described}"), centre.symbol())
         })
     }
 }

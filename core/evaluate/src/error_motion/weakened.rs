@@ -40,23 +40,7 @@ mod tests {
     /// Motion of order 20 behind a low-pass at order 11: what is left of it proves nothing.
     #[test]
     fn motion_above_a_low_pass_is_said_to_be_weakened() {
-        let value = |symbol: &str| Value {
-            symbol: symbol.into(),
-            unit: "um".into(),
-            value: 1.0,
-            source: String::new(),
-            band_upr: [2, 63],
-            lost_orders: Vec::new(),
-            weakened_above_upr: None,
-            absent_above_upr: None,
-            no_uncertainty: None,
-            filter: "none".into(),
-            reference: "LSC".into(),
-            coverage: 1.0,
-            uncertainty: None,
-            raised_by_noise: None,
-            refuted_by: None,
-        };
+        let value = |symbol: &str| Value { band_upr: [2, 63], ..Value::referred(symbol, 1.0, "um", "", "LSC") };
         let of = |order: usize| {
             let separation = Separation {
                 variance: vec![1e-8; 4 * 21],

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::MOST_KEY_VALUES;
-use crate::summary::{NamedValue, PlacedValue, Summary};
+use crate::summary::{PlacedValue, Summary, Value};
 use runout_closed_loop::diagnosis::Diagnosis;
 use runout_evaluate::{ValueId, key_symbols};
 use runout_table::number::in_small_unit;
@@ -67,6 +67,10 @@ impl Number {
         self.interval_95.is_some_and(|[low, high]| !(low..=high).contains(&self.value))
     }
 
+    fn of(value: &Value) -> Self {
+        Self { value: value.value, std: value.std(), interval_95: value.interval_95() }
+    }
+
     fn scaled(self, factor: f64) -> Self {
         Self {
             value: factor * self.value,
@@ -76,87 +80,40 @@ impl Number {
     }
 }
 
-/// One number of a result, whatever kind of value it is.
-struct One<'a> {
-    id: ValueId<'a>,
-    part: String,
-    unit: &'a str,
-    number: Number,
-    is_refuted: bool,
-    lost_orders: &'a [usize],
-    about: &'a str,
-    no_uncertainty: Option<&'a str>,
-}
-
-impl<'a> One<'a> {
-    fn placed(placed: PlacedValue<'a>) -> Self {
-        let value = placed.value;
-        let known = value.uncertainty.as_ref();
-        Self {
-            id: value.id(),
-            part: placed.section.map(|section| format!("section {section}")).unwrap_or_default(),
-            unit: &value.unit,
-            number: Number {
-                value: value.value,
-                std: known.map(|known| known.std),
-                interval_95: known.map(|known| known.interval_95),
-            },
-            is_refuted: value.refuted_by.is_some(),
-            lost_orders: &value.lost_orders,
-            about: &value.source,
-            no_uncertainty: value.no_uncertainty.as_deref(),
-        }
-    }
-
-    fn named(value: &'a NamedValue) -> Option<Self> {
-        Some(Self {
-            id: ValueId { of: None, ..value.id() },
-            part: value.of.clone().unwrap_or_default(),
-            unit: &value.unit,
-            number: Number { value: value.value?, std: value.std, interval_95: value.interval_95 },
-            is_refuted: value.refuted_by.is_some(),
-            lost_orders: &[],
-            about: &value.about,
-            no_uncertainty: value.no_uncertainty.as_deref(),
-        })
-    }
-}
-
 /// The key values: those that the domain names, then the standards'.
 pub(super) fn key_values(summary: &Summary, diagnosis: Option<&Diagnosis>) -> Vec<KeyValue> {
-    let own = || summary.values.iter().filter_map(One::named);
-    let all: Vec<One> = summary.placed_values().into_iter().map(One::placed).chain(own()).collect();
+    let all: Vec<PlacedValue> = summary.all_values().into_iter().filter(|one| one.value.value.is_finite()).collect();
     let mut symbols: Vec<&str> = Vec::new();
     for value in summary.values.iter().filter(|value| value.is_key) {
         if !symbols.contains(&&*value.symbol) {
             symbols.push(&value.symbol);
         }
     }
-    for symbol in key_symbols(&all.iter().map(|one| one.id.symbol).collect::<Vec<_>>()) {
+    for symbol in key_symbols(&all.iter().map(|one| &*one.value.symbol).collect::<Vec<_>>()) {
         if !symbols.contains(&symbol) {
             symbols.push(symbol);
         }
     }
     let mut rows = Vec::new();
     for symbol in symbols {
-        let of_symbol: Vec<&One> = all.iter().filter(|one| one.id.symbol == symbol).collect();
+        let mut of_symbol = all.iter().filter(|one| one.value.symbol == symbol).peekable();
         // Of several references and filters the first: what is least filtered about the usual reference.
-        let Some(first) = of_symbol.first() else { continue };
-        let like = |one: &&&One| (one.id.reference, one.id.filter) == (first.id.reference, first.id.filter);
-        let alike: Vec<&One> = of_symbol.iter().filter(like).copied().collect();
-        let mut parts: Vec<&str> = Vec::new();
+        let Some(first) = of_symbol.peek().copied() else { continue };
+        let basis = |one: &PlacedValue| (one.value.reference.clone(), one.value.filter.clone());
+        let alike: Vec<&PlacedValue> = of_symbol.filter(|one| basis(one) == basis(first)).collect();
+        let mut parts: Vec<Option<&str>> = Vec::new();
         for one in &alike {
-            if !parts.contains(&&*one.part) {
-                parts.push(&one.part);
+            if !parts.contains(&one.section) {
+                parts.push(one.section);
             }
         }
         if parts.len() > MOST_PARTS {
-            let word = if parts.iter().all(|part| part.starts_with("section ")) { "sections" } else { "parts" };
+            let word = if alike.iter().all(|one| one.value.of.is_none()) { "sections" } else { "parts" };
             rows.push(row(format!("{} {word}", parts.len()), &alike, diagnosis));
         } else {
             for part in parts {
-                let of_part: Vec<&One> = alike.iter().filter(|one| one.part == part).copied().collect();
-                rows.push(row(part.to_owned(), &of_part, diagnosis));
+                let of_part: Vec<&PlacedValue> = alike.iter().filter(|one| one.section == part).copied().collect();
+                rows.push(row(of_part.first().and_then(|one| one.part()).unwrap_or_default(), &of_part, diagnosis));
             }
         }
     }
@@ -164,29 +121,29 @@ pub(super) fn key_values(summary: &Summary, diagnosis: Option<&Diagnosis>) -> Ve
 }
 
 /// One row of numbers that are gathered.
-fn row(of: String, ones: &[&One], diagnosis: Option<&Diagnosis>) -> Option<KeyValue> {
-    let mut numbers: Vec<Number> = ones.iter().map(|one| one.number).filter(|one| one.value.is_finite()).collect();
+fn row(of: String, ones: &[&PlacedValue], diagnosis: Option<&Diagnosis>) -> Option<KeyValue> {
+    let mut numbers: Vec<Number> = ones.iter().map(|one| Number::of(one.value)).collect();
     numbers.sort_by(|a, b| a.value.total_cmp(&b.value));
     let largest = numbers.iter().map(|number| number.value.abs()).fold(0.0, f64::max);
     let first = ones.first()?;
-    let (factor, unit) = in_small_unit(largest, first.unit);
+    let (factor, unit) = in_small_unit(largest, &first.value.unit);
     let shown = match numbers[..] {
         [] => return None,
         [only] => vec![only],
         [low, .., high] => vec![low, numbers[(numbers.len() - 1) / 2], high],
     };
-    let lost: BTreeSet<usize> = ones.iter().flat_map(|one| one.lost_orders.iter().copied()).collect();
+    let lost: BTreeSet<usize> = ones.iter().flat_map(|one| one.value.lost_orders.iter().copied()).collect();
     Some(KeyValue {
-        symbol: first.id.symbol.to_owned(),
-        basis: basis(&first.id),
+        symbol: first.value.symbol.clone(),
+        basis: basis(&first.id()),
         of,
         unit: unit.to_owned(),
         before: (numbers.len() == 1).then(|| before(first, diagnosis)).flatten().map(|before| factor * before),
         numbers: shown.into_iter().map(|number| number.scaled(factor)).collect(),
-        is_refuted: ones.iter().any(|one| one.is_refuted),
+        is_refuted: ones.iter().any(|one| one.value.refuted_by.is_some()),
         lost_orders: lost.into_iter().collect(),
-        about: first.about.to_owned(),
-        no_uncertainty: first.no_uncertainty.map(str::to_owned),
+        about: first.value.source.clone(),
+        no_uncertainty: first.value.no_uncertainty.clone(),
     })
 }
 
@@ -203,13 +160,17 @@ fn basis(id: &ValueId) -> String {
 }
 
 /// The value before the loop changed it.
-fn before(one: &One, diagnosis: Option<&Diagnosis>) -> Option<f64> {
-    let part = one.part.strip_prefix("section ").unwrap_or(&one.part);
+fn before(one: &PlacedValue, diagnosis: Option<&Diagnosis>) -> Option<f64> {
+    let id = one.id();
     let moved = diagnosis?.moved.iter().find(|moved| {
-        let place = moved.section.as_deref().unwrap_or_default();
-        moved.value == one.id.symbol
-            && (moved.reference.as_deref(), moved.filter.as_deref()) == (one.id.reference, one.id.filter)
-            && place == part
+        let of = ValueId {
+            symbol: &moved.value,
+            reference: moved.reference.as_deref(),
+            filter: moved.filter.as_deref(),
+            of: moved.section.as_deref(),
+            ..id
+        };
+        of == id
     })?;
     (moved.before.is_finite()).then_some(moved.before)
 }

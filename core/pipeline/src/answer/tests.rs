@@ -1,10 +1,10 @@
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 use super::{Answer, Judgement, MOST_KEY_VALUES};
-use crate::summary::{NamedValue, Summary};
+use crate::summary::{Summary, Value};
 
-fn named(symbol: &str, value: f64, std: f64) -> NamedValue {
-    NamedValue::new(symbol, value, std, "um", "")
+fn named(symbol: &str, value: f64, std: f64) -> Value {
+    Value::new(symbol, value, std, "um", "")
 }
 
 #[test]

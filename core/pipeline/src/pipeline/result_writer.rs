@@ -14,7 +14,7 @@ use super::{
 use crate::{
     atomic_file::{FolderLock, PendingFile, commit_all, commit_last_after_others},
     stage::{About, Completed, Export, Exporter, PointSeparator, ResultInfo, Takes},
-    summary::{LostOrders, NamedValue, PartSummary, Summary, SurfaceSummary},
+    summary::{LostOrders, PartSummary, Summary, SurfaceSummary, Value},
 };
 use runout_closed_loop::{correction::Correction, diagnosis, diagnosis::Diagnosis};
 use runout_consistency::Check;
@@ -62,8 +62,6 @@ pub(super) struct ResultWriter {
     convention: String,
     /// Heights on a plane.
     heights: Option<HeightGrid>,
-    /// Values of open profiles and height maps, for limits.
-    evaluated: Evaluated,
     summary: Summary,
     warnings: Warnings,
     /// What the closed loop found.
@@ -118,7 +116,6 @@ impl ResultWriter {
             interrupted: false,
             convention: String::new(),
             heights: None,
-            evaluated: Evaluated::default(),
             summary: begun(pipeline),
             warnings: noted(pipeline),
             diagnosis: None,
@@ -159,10 +156,9 @@ impl ResultWriter {
     }
 
     /// Takes a domain's own values, those of the standards of what it offers beside form, and the convention of its tables.
-    pub(super) fn take_values(&mut self, values: Vec<NamedValue>, evaluated: Evaluated, convention: String) {
-        self.summary.values = evaluated.named().chain(values).collect();
-        self.note(evaluated.remarks.clone());
-        self.evaluated = evaluated;
+    pub(super) fn take_values(&mut self, values: Vec<Value>, evaluated: Evaluated, convention: String) {
+        self.summary.values = evaluated.values.into_iter().chain(values).collect();
+        self.note(evaluated.remarks);
         self.convention = convention;
     }
 
@@ -255,10 +251,7 @@ impl ResultWriter {
             self.summary.provenance.inputs.push(Input::of(file)?);
         }
         self.summary.refute_part();
-        let own = self.summary.own_values();
-        let own = self.evaluated.placed().chain(own.iter().map(values::PlacedValue::own));
-        let placed: Vec<_> = self.summary.placed_values().into_iter().chain(own).collect();
-        let (limits, unmatched) = values::decide(self.evaluate.limits(), &placed)?;
+        let (limits, unmatched) = values::decide(self.evaluate.limits(), &self.summary.all_values())?;
         self.summary.limits = limits;
         self.gather_warnings(remarks.into_iter().chain(unmatched));
         let values = if self.of_form {

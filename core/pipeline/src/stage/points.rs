@@ -3,7 +3,7 @@
 use super::{Evaluable, EvaluableKind, Form, plan::PointPlan};
 use crate::{
     points::{PointColumn, Points},
-    summary::NamedValue,
+    summary::Value,
 };
 use runout_closed_loop::{
     Effect, Fit, Model,
@@ -147,7 +147,7 @@ pub struct Outcome {
     /// Rows of its tables.
     pub tables: Vec<TableRows>,
     /// Values.
-    pub values: Vec<NamedValue>,
+    pub values: Vec<Value>,
     /// The tests of the points on themselves.
     pub checks: Vec<Check>,
     /// What the standards' values are computed from.

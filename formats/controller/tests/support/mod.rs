@@ -70,7 +70,7 @@ pub(crate) fn of_curves(toml: &str, curves: &ComponentCurves, rotary: bool) -> R
 pub(crate) fn of_outcome(toml: &str, specs: &[TableSpec], outcome: &Outcome) -> Result<String> {
     let of = |rows: &TableRows| (specs.iter().find(|spec| spec.name == rows.table).unwrap().clone(), rows.clone());
     let tables: Vec<_> = outcome.tables.iter().map(of).collect();
-    let value = |value: &runout_core::summary::NamedValue| Some((value.symbol.clone(), value.value?));
+    let value = |value: &runout_core::summary::Value| Some((value.symbol.clone(), value.number()?));
     written(toml, &tables, &outcome.values.iter().filter_map(value).collect::<Vec<_>>())
 }
 

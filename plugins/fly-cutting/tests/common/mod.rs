@@ -43,7 +43,7 @@ pub(crate) fn diagnose(grid: HeightGrid, separator: &FlyCutting) -> PointDiagnos
 
 pub(crate) fn value(outcome: &Outcome, symbol: &str, of: Option<&str>) -> f64 {
     let found = outcome.values.iter().find(|value| value.symbol == symbol && value.of.as_deref() == of);
-    found.unwrap().value.unwrap()
+    found.unwrap().value
 }
 
 pub(crate) fn parameter(added: &Added, name: &str) -> [f64; 2] {

@@ -45,7 +45,7 @@ pub(crate) fn separated(config: &str, points: &Points) -> Outcome {
 /// A value and its standard uncertainty; NaN where lost.
 pub(crate) fn value(outcome: &Outcome, symbol: &str) -> [f64; 2] {
     let found = outcome.values.iter().find(|value| value.symbol == symbol).unwrap();
-    [found.value.unwrap_or(f64::NAN), found.std.unwrap_or(f64::NAN)]
+    [found.value, found.std().unwrap_or(f64::NAN)]
 }
 
 /// A column of a table; NaN for null.

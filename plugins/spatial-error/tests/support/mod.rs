@@ -8,7 +8,7 @@ use runout_core::{
     pipeline::Context,
     points::{Column, Points, Trace},
     stage::Outcome,
-    summary::NamedValue,
+    summary::Value,
     table::RecordBatch,
 };
 use runout_spatial_error::{
@@ -67,7 +67,7 @@ pub(crate) fn flags(rows: &RecordBatch, name: &str) -> Vec<bool> {
     (0..column.len()).map(|index| bits[index / 8] >> (index % 8) & 1 == 1).collect()
 }
 
-pub(crate) fn value<'a>(outcome: &'a Outcome, symbol: &str, of: Option<&str>) -> &'a NamedValue {
+pub(crate) fn value<'a>(outcome: &'a Outcome, symbol: &str, of: Option<&str>) -> &'a Value {
     outcome.values.iter().find(|value| value.symbol == symbol && value.of.as_deref() == of).unwrap()
 }
 

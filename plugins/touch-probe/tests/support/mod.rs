@@ -6,7 +6,7 @@ use std::f64::consts::TAU;
 
 use runout_core::{
     stage::Outcome,
-    summary::NamedValue,
+    summary::Value,
     table::{ArrayRef, RecordBatch},
 };
 use runout_touch_probe::{
@@ -125,6 +125,6 @@ pub(crate) fn flags(column: &ArrayRef) -> Vec<bool> {
     (0..column.len()).map(|index| bits[index / 8] >> (index % 8) & 1 == 1).collect()
 }
 
-pub(crate) fn value<'a>(outcome: &'a Outcome, symbol: &str) -> &'a NamedValue {
+pub(crate) fn value<'a>(outcome: &'a Outcome, symbol: &str) -> &'a Value {
     outcome.values.iter().find(|value| value.symbol == symbol).unwrap()
 }

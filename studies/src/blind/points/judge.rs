@@ -7,7 +7,7 @@ use runout_core::{
         diagnosis::{Added, Diagnosis, Verdict},
     },
     stage::PointModel,
-    summary::NamedValue,
+    summary::Value,
 };
 
 use super::{Campaign, Planted, True};
@@ -115,18 +115,18 @@ fn model(campaign: &Campaign) -> Result<&dyn PointModel> {
 }
 
 /// A value and its standard uncertainty; NaN where either is not known.
-fn known(values: &[NamedValue], truth: &True) -> [f64; 2] {
+fn known(values: &[Value], truth: &True) -> [f64; 2] {
     let found = values.iter().find(|value| value.symbol == truth.symbol && value.of == truth.of);
-    found.and_then(|value| value.value.zip(value.std)).map_or([f64::NAN; 2], |(value, std)| [value, std])
+    found.and_then(|value| value.number().zip(value.std())).map_or([f64::NAN; 2], |(value, std)| [value, std])
 }
 
 /// Error over standard uncertainty.
-fn ratio(values: &[NamedValue], truth: &True) -> f64 {
+fn ratio(values: &[Value], truth: &True) -> f64 {
     let [value, std] = known(values, truth);
     (value - truth.value) / std
 }
 
-fn farther(declared: &[NamedValue], last: &[NamedValue], truth: &True) -> f64 {
+fn farther(declared: &[Value], last: &[Value], truth: &True) -> f64 {
     let ([before, _], [after, std]) = (known(declared, truth), known(last, truth));
     ((after - truth.value).abs() - (before - truth.value).abs()) / std
 }

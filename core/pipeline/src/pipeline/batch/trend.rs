@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use crate::summary::Limit;
 use runout_error::Result;
+use runout_evaluate::ValueId;
 use runout_standards::control_chart::{ControlChart, Signal, Tests};
 use runout_table::{
     Array, ColumnSpec, Figure, Float64Array, Measure, RecordBatch, StringArray, TableSpec, counts, numbers_or_null,
@@ -258,9 +259,11 @@ impl Trend {
 
     /// What the limits allow for a value of these names.
     fn tolerance(&self, names: &[String; NAMES.len()]) -> [Option<f64>; 2] {
-        let [symbol, reference, filter, _, section, ..] = names;
-        let section = Some(section.as_str()).filter(|id| !id.is_empty());
-        let named = || self.limits.iter().filter(|limit| limit.names(symbol, section, reference, filter));
+        let [symbol, reference, filter, of, section, ..] = names.each_ref().map(String::as_str);
+        let there = |text| Some(text).filter(|text: &&str| !text.is_empty());
+        let of = there(of).or(there(section));
+        let id = ValueId { symbol, reference: there(reference), filter: there(filter), band_upr: [0; 2], of };
+        let named = || self.limits.iter().filter(|limit| limit.names(&id));
         [
             named().filter_map(|limit| limit.lower).reduce(f64::max),
             named().filter_map(|limit| limit.upper).reduce(f64::min),

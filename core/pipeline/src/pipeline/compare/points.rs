@@ -23,7 +23,7 @@ use crate::{
     },
     points::PointColumn,
     stage::{Outcome, PointSeparator, Request, Source},
-    summary::{LostOrders, NamedValue},
+    summary::{LostOrders, Value},
 };
 use runout_error::{Error, Result};
 use runout_table::{Array, Float64Array, TableRows};
@@ -111,7 +111,7 @@ impl<'a> ComparingPoints<'a> {
             let mut outcome = separator.separate(&points)?;
             let evaluated =
                 Evaluated::of(&outcome.evaluables, &pipeline.evaluate, refuted_by(&outcome.checks).as_deref())?;
-            outcome.values = evaluated.named().chain(outcome.values).collect();
+            outcome.values = evaluated.values.into_iter().chain(outcome.values).collect();
             Ok::<Outcome, Error>(outcome)
         };
         let mut outcomes = vec![(self.names[0].clone(), self.reference, separate(self.reference)?)];
@@ -176,28 +176,28 @@ fn normalised(difference: f64, stds: [Option<f64>; 2]) -> Option<f64> {
 
 /// Every value that any method gives, in the order of the first that gives it.
 fn values(outcomes: &[(&str, &Outcome)]) -> Vec<ValueComparison> {
-    let same = |one: &NamedValue, other: &NamedValue| one.id() == other.id();
-    let mut kinds: Vec<&NamedValue> = Vec::new();
+    let same = |one: &Value, other: &Value| one.id() == other.id();
+    let mut kinds: Vec<&Value> = Vec::new();
     for value in outcomes.iter().flat_map(|(_, outcome)| &outcome.values) {
         if !kinds.iter().any(|known| same(known, value)) {
             kinds.push(value);
         }
     }
-    let compared = |kind: &NamedValue| {
+    let compared = |kind: &Value| {
         let by = |outcome: &Outcome| {
             outcome.values.iter().find(|value| same(value, kind) && value.unit == kind.unit).cloned()
         };
-        let all: Vec<(&str, NamedValue)> =
+        let all: Vec<(&str, Value)> =
             outcomes.iter().filter_map(|(name, outcome)| Some((*name, by(outcome)?))).collect();
         let reference = outcomes.first().and_then(|(_, outcome)| by(outcome));
         let differences = reference.iter().flat_map(|reference| {
             all.iter().skip(1).filter_map(|(method, value)| {
-                let difference = value.value? - reference.value?;
-                let ratio = value.std.zip(reference.std).filter(|(_, own)| *own > 0.0);
+                let difference = value.number()? - reference.number()?;
+                let ratio = value.std().zip(reference.std()).filter(|(_, own)| *own > 0.0);
                 Some(ValueDifference {
                     method: (*method).to_owned(),
                     difference,
-                    e_n: normalised(difference, [value.std, reference.std]),
+                    e_n: normalised(difference, [value.std(), reference.std()]),
                     std_ratio: ratio.map(|(std, own)| std / own),
                 })
             })
@@ -206,13 +206,17 @@ fn values(outcomes: &[(&str, &Outcome)]) -> Vec<ValueComparison> {
             symbol: kind.symbol.clone(),
             of: kind.of.clone(),
             unit: kind.unit.clone(),
-            about: kind.about.clone(),
+            about: kind.source.clone(),
             reference: kind.reference.clone(),
             filter: kind.filter.clone(),
             differences: differences.collect(),
             values: all
                 .iter()
-                .map(|(method, value)| ValueOf { method: (*method).to_owned(), value: value.value, std: value.std })
+                .map(|(method, value)| ValueOf {
+                    method: (*method).to_owned(),
+                    value: value.number(),
+                    std: value.std(),
+                })
                 .collect(),
         }
     };

@@ -38,8 +38,8 @@ pub(super) fn moved(
         if let (Some(declared), Some(value)) = (before.ront(section), found) {
             let std = value.uncertainty.as_ref().map_or(f64::NAN, |uncertainty| uncertainty.std);
             moved.push(Moved {
-                reference: Some(value.reference.clone()),
-                filter: Some(value.filter.clone()),
+                reference: value.reference.clone(),
+                filter: value.filter.clone(),
                 lost_orders: lost.clone(),
                 ..of(&value.symbol, declared.value, value.value, std)
             });

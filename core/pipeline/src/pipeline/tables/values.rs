@@ -2,7 +2,7 @@
 
 use serde_json::json;
 
-use crate::summary::{NamedValue, Summary};
+use crate::summary::Summary;
 use runout_closed_loop::correction::Correction;
 use runout_consistency::Check;
 use runout_draws::Uncertainty;
@@ -103,8 +103,8 @@ pub(super) fn values_rows(summary: &Summary) -> Vec<ArrayRef> {
         })),
         numbers_or_null(rows.iter().map(|row| row.value.weakened_above_upr)),
         counts_or_null(rows.iter().map(|row| row.value.absent_above_upr)),
-        of_value(|value| &value.filter),
-        of_value(|value| &value.reference),
+        of_value(|value| value.filter.as_deref().unwrap_or_default()),
+        of_value(|value| value.reference.as_deref().unwrap_or_default()),
         numbers(rows.iter().map(|row| row.value.coverage)),
         uncertainty(|uncertainty| uncertainty.std),
         uncertainty(|uncertainty| uncertainty.interval_95[0]),
@@ -121,7 +121,7 @@ pub(super) fn values_rows(summary: &Summary) -> Vec<ArrayRef> {
 #[must_use]
 pub(crate) fn named_values(of_form: bool) -> TableSpec {
     let interval = |name: &str, about: &str| {
-        ColumnSpec::number(name, "the column unit", format!("{about}; null where none is stated")).or_null()
+        ColumnSpec::number(name, "the column unit", format!("{about}; null where it is not known")).or_null()
     };
     TableSpec::new(
         // Beside those that are computed from form.
@@ -150,17 +150,17 @@ pub(crate) fn named_values(of_form: bool) -> TableSpec {
 ///
 /// # Errors
 /// Never in practice: the columns are of one length.
-pub(crate) fn named_value_rows(values: &[NamedValue], of_form: bool) -> Result<TableRows> {
+pub(crate) fn named_value_rows(values: &[Value], of_form: bool) -> Result<TableRows> {
     let spec = named_values(of_form);
     let rows = spec.rows(vec![
         texts(values.iter().map(|value| &value.symbol)),
         texts_or_null(values.iter().map(|value| value.of.as_ref())),
-        numbers_or_null(values.iter().map(|value| value.value)),
-        numbers_or_null(values.iter().map(|value| value.std)),
+        numbers_or_null(values.iter().map(Value::number)),
+        numbers_or_null(values.iter().map(Value::std)),
         texts(values.iter().map(|value| &value.unit)),
-        texts(values.iter().map(|value| &value.about)),
-        numbers_or_null(values.iter().map(|value| value.interval_95.map(|[low, _]| low))),
-        numbers_or_null(values.iter().map(|value| value.interval_95.map(|[_, high]| high))),
+        texts(values.iter().map(|value| &value.source)),
+        numbers_or_null(values.iter().map(|value| value.interval_95().map(|[low, _]| low))),
+        numbers_or_null(values.iter().map(|value| value.interval_95().map(|[_, high]| high))),
         texts_or_null(values.iter().map(|value| value.reference.as_ref())),
         texts_or_null(values.iter().map(|value| value.filter.as_ref())),
         texts_or_null(values.iter().map(|value| value.no_uncertainty.as_ref())),

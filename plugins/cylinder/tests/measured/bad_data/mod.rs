@@ -71,7 +71,7 @@ fn a_bad_circle_is_named_whatever_is_wrong_with_it() {
         |angle| 8.0 * (3.0 * angle).cos(),
         |angle| if angle < 3.0 { 6.0 } else { -6.0 },
     ];
-    for bad in 0..8 {
+    for bad in [0, 3, 7] {
         for (kind, wrong) in wrong.iter().enumerate() {
             let found = diagnosed(|circle, angle, _| if circle == bad { wrong(angle) } else { 0.0 });
             assert_eq!(found.verdict, Verdict::Improved);

@@ -79,7 +79,6 @@ fn a_step_of_a_level_is_said_and_is_no_drift() {
 fn a_large_stranger_is_blamed_on_nothing() {
     for (seed, effect) in [
         (41, r#"{"plugin":"step","targets":["S3"],"setups":["b"],"step_um":-126.0,"from_deg":56.0,"to_deg":187.0}"#),
-        (42, r#"{"plugin":"step","targets":["S1"],"setups":["b"],"step_um":-41.0,"from_deg":52.0,"to_deg":146.0}"#),
         (43, r#"{"plugin":"dent","setups":["c"],"depth_um":-92.0,"width_deg":3.2,"part_angle_deg":221.0}"#),
         (44, r#"{"plugin":"backlash","targets":["S1"],"play_um":10.0}"#),
     ] {
