@@ -3,12 +3,13 @@
 mod reported;
 
 pub use reported::ReportedValue;
+use runout_evaluate::nan_for_null;
 pub use runout_evaluate::{Decision, Limit, LimitSummary, LimitValue, NamedValue, PartSummary, PlacedValue, Value};
 
 use std::{collections::BTreeMap, path::PathBuf};
 
 use schemars::JsonSchema;
-use serde::{Deserialize, Deserializer, Serialize};
+use serde::{Deserialize, Serialize};
 
 use runout_closed_loop::{correction::Correction, diagnosis};
 use runout_consistency::{Check, Test, refuted_by};
@@ -236,11 +237,6 @@ pub struct SectionSummary {
     pub values: Vec<Value>,
     /// True error of the form (root mean square over observable orders from 2), where the truth is known.
     pub truth_form_rms_error_um: Option<f64>,
-}
-
-/// NaN, which JSON has no number for, is written as null.
-fn nan_for_null<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
-    Ok(Option::deserialize(deserializer)?.unwrap_or(f64::NAN))
 }
 
 /// True errors of the motion: root mean square over observable orders from 2.

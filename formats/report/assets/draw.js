@@ -111,6 +111,15 @@ const Draw = (() => {
     return { shapes: [{ type: "line", xref: "paper", x0: 0, x1: 1, yref: "y", y0: at, y1: at, line, name: plain(name), showlegend: true }], showlegend: true };
   }
 
+  // Limits that differ from place to place.
+  function over(figure) {
+    const { ink } = colours();
+    return (figure.lines ?? []).map(({ name, x, y }) => ({
+      type: "scatter", mode: "lines", x: numbers(x), y: numbers(y), name: plain(name), line: { color: ink, width: 1.2, dash: "dash" }, meta: "limit", showlegend: true,
+      hovertemplate: `order %{x}: limit %{y} ${figure.y.unit}<extra></extra>`,
+    }));
+  }
+
   const MOST_PLACES = 30; // Names beside each other below a chart.
 
   // The horizontal axis, with the names of its places where there are some.
@@ -217,6 +226,8 @@ const Draw = (() => {
         marker: { color: "rgba(0,0,0,0)", line: { width: 0 }, pattern: { shape: "/", fgcolor: faint, size: 6 } }, showlegend: true,
       });
     }
+    const limits = over(figure);
+    traces.push(...limits);
     const first = lowest || 1;
     const xaxis = axis({ name: "order", unit: "UPR" }, { range: [first - 0.6, Math.min(highest, FIRST_ORDERS) + 0.6], tickformat: "d" });
     const yaxis = wide ? { type: "log", range: [Math.log10(lowestShown), Math.log10(1.5 * tallest)], dtick: 1, exponentformat: "power" } : { range: [0, 1.06 * tallest] };

@@ -51,13 +51,14 @@ impl<'a> Cell<'a> {
 }
 
 /// Names of the columns, with the width of a sheet's column in characters.
-const COLUMNS: [(&str, u16); 17] = [
+const COLUMNS: [(&str, u16); 18] = [
     ("station", 12),
     ("of", 16),
     ("z_mm", 10),
     ("symbol", 18),
     ("reference", 22),
     ("filter", 20),
+    ("order", 8),
     ("value", 12),
     ("unit", 8),
     ("std", 12),
@@ -74,7 +75,7 @@ const COLUMNS: [(&str, u16); 17] = [
 /// A value's row, as [`COLUMNS`].
 fn row<'a>(value: &ReportedValue<'a>) -> [Cell<'a>; COLUMNS.len()] {
     let [low, high] = value.interval_95.map_or([None; 2], |ends| ends.map(Some));
-    let limit = value.limit.map(|(limit, _)| limit);
+    let [lower, upper] = value.limit.map_or([None; 2], |(limit, found)| found.ends(limit));
     [
         Cell::text(value.station),
         Cell::text(value.id.of),
@@ -82,14 +83,15 @@ fn row<'a>(value: &ReportedValue<'a>) -> [Cell<'a>; COLUMNS.len()] {
         Cell::text(Some(value.id.symbol)),
         Cell::text(value.id.reference),
         Cell::text(value.id.filter),
+        Cell::number(value.id.order().map(|order| order as f64)),
         Cell::number(value.value),
         Cell::text(Some(value.unit)),
         Cell::number(value.std),
         Cell::number(low),
         Cell::number(high),
         Cell::text(value.interval.map(IntervalKind::name)),
-        Cell::number(limit.and_then(|limit| limit.lower)),
-        Cell::number(limit.and_then(|limit| limit.upper)),
+        Cell::number(lower),
+        Cell::number(upper),
         Cell::text(decision(value).map(decision_name)),
         Cell::text(value.remark()),
         Cell::text(Some(value.about)),

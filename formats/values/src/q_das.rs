@@ -102,8 +102,9 @@ fn contents(summary: &Summary, config: &QDasConfig) -> Vec<u8> {
         of_value("K2003", value.id.symbol);
         of_value("K2004", "0");
         of_value("K2022", &digits(value.std).to_string());
-        if let Some((limit, _)) = value.limit {
-            for (limit_key, kind_key, end) in [("K2110", "K2120", limit.lower), ("K2111", "K2121", limit.upper)] {
+        if let Some((limit, found)) = value.limit {
+            let [lower, upper] = found.ends(limit);
+            for (limit_key, kind_key, end) in [("K2110", "K2120", lower), ("K2111", "K2121", upper)] {
                 let end = end.map(|end| end.to_string()).unwrap_or_default();
                 of_value(kind_key, if end.is_empty() { "" } else { "1" });
                 of_value(limit_key, &end);
@@ -125,10 +126,7 @@ fn contents(summary: &Summary, config: &QDasConfig) -> Vec<u8> {
 fn description(value: &ReportedValue) -> String {
     let station = value.station.map(|station| format!(", station {station}")).unwrap_or_default();
     // The band is said where it alone distinguishes values: harmonics of one order.
-    let order = match value.id.band_upr {
-        [low, high] if low == high && low > 0 => format!(", order {low}"),
-        _ => String::new(),
-    };
+    let order = value.id.order().map(|order| format!(", order {order}")).unwrap_or_default();
     format!("{}{order}{station}", value.id)
 }
 

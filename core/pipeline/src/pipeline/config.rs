@@ -19,6 +19,7 @@ pub use schema::{PlainTable, choice, pipeline_schema, plain_tables};
 use super::{
     document::{self, ConfigError, Document, Sources, Table, checked, required, table, tables},
     registry::{Context, Registry},
+    tables::FORM_HARMONICS,
 };
 use crate::{
     stage::{Check, Exporter, Loader, PointSeparator, Request, SourceKind},
@@ -191,7 +192,7 @@ impl Pipeline {
             .map(|table| registry.checks.build(table, &context))
             .collect::<Result<_, _>>()?;
         let evaluate = evaluate(root, &route, rig.as_ref(), assessment.as_ref())?;
-        let of_result = route.tables(assessment.as_ref(), rig.as_ref());
+        let of_result = with_limits(route.tables(assessment.as_ref(), rig.as_ref()), evaluate.limits());
         let exporting = Exporting {
             registry,
             context: &context,
@@ -295,6 +296,20 @@ fn named_files(root: &Table, folder: &Path) -> Vec<PathBuf> {
     found
 }
 
+/// The tables of a result with the limits of its harmonics in their figure.
+fn with_limits(mut tables: Vec<TableSpec>, limits: &[Limit]) -> Vec<TableSpec> {
+    let figures = tables.iter_mut().flat_map(|table| &mut table.figures);
+    for figure in figures.filter(|figure| figure.id == FORM_HARMONICS) {
+        for limit in limits {
+            let Some(orders) = limit.orders else { continue };
+            let points = (orders.first..=orders.last).filter_map(|order| Some([order as f64, limit.upper_at(order)?]));
+            let section = limit.section.as_ref().map(|section| format!(" of section {section}")).unwrap_or_default();
+            figure.add_line(format!("limit{section}"), points.collect());
+        }
+    }
+    tables
+}
+
 /// What is evaluated of a result, and the limits of it.
 fn evaluate(
     root: &Table,
@@ -336,7 +351,10 @@ fn evaluate(
         evaluate.add_faces(rig);
     }
     for table in limits {
-        let limit = checked::<Limit, _>(&table, |limit| limit.check(&evaluate, &own, rig))?;
+        let limit = checked::<Limit, _>(&table, |limit| {
+            limit.orders.into_iter().for_each(|orders| evaluate.add_amplitudes(orders));
+            limit.check(&evaluate, &own, rig)
+        })?;
         evaluate.add_limit(limit);
     }
     Ok(evaluate)

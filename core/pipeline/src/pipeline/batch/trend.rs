@@ -260,7 +260,9 @@ impl Trend {
     fn tolerance(&self, names: &[String; NAMES.len()]) -> [Option<f64>; 2] {
         let [symbol, reference, filter, _, section, ..] = names;
         let section = Some(section.as_str()).filter(|id| !id.is_empty());
-        let named = || self.limits.iter().filter(|limit| limit.names(symbol, section, reference, filter));
+        // The order of an amplitude is not among the names.
+        let of_all = |limit: &&Limit| limit.orders.is_none() && limit.names(symbol, section, reference, filter);
+        let named = || self.limits.iter().filter(of_all);
         [
             named().filter_map(|limit| limit.lower).reduce(f64::max),
             named().filter_map(|limit| limit.upper).reduce(f64::min),
