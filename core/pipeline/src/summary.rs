@@ -8,6 +8,7 @@ pub use runout_evaluate::{Decision, Limit, LimitSummary, LimitValue, NamedValue,
 
 use std::{collections::BTreeMap, path::PathBuf};
 
+use crate::report_head::ReportHead;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -20,6 +21,9 @@ use runout_turning::{provenance::Provenance, reading::ReadingValues, separation:
 pub struct Summary {
     /// The pipeline's title.
     pub title: String,
+    /// What the head of a report says; absent where the pipeline has no [report].
+    #[serde(default, skip_serializing_if = "ReportHead::is_empty")]
+    pub head: ReportHead,
     /// Enough to repeat the run.
     pub provenance: Provenance,
     /// Effects that the results are corrected for: what `diagnose` added, and what `[diagnose] known` declares. Those of a run

@@ -93,7 +93,21 @@ fn contents(summary: &Summary, config: &QDasConfig) -> Vec<u8> {
     field("K0100", &values.len().to_string());
     field("K1001", config.part_number.as_deref().unwrap_or_default());
     field("K1002", config.part.as_ref().unwrap_or(&summary.title));
-    field("K1900", &format!("{}; um and urad: micrometres and microradians", summary.provenance.program));
+    let head = &summary.head;
+    let known = [
+        ("K1062", &head.customer),
+        ("K1081", &head.serial_number),
+        ("K1082", &head.machine),
+        ("K1202", &head.instrument),
+        ("K1222", &head.operator),
+    ];
+    for (key, text) in known {
+        field(key, text.as_deref().unwrap_or_default());
+    }
+    let mut remarks = vec![format!("{}; um and urad: micrometres and microradians", summary.provenance.program)];
+    remarks.extend(head.calibrated.as_ref().map(|date| format!("instrument calibrated {date}")));
+    remarks.extend(head.fields.iter().map(|(name, text)| format!("{name}: {text}")));
+    field("K1900", &remarks.join("; "));
     for (index, (value, _)) in values.iter().enumerate() {
         let number = index + 1;
         let mut of_value = |key: &str, content: &str| field(&format!("{key}/{number}"), content);

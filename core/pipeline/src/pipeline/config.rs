@@ -22,13 +22,15 @@ use super::{
     tables::FORM_HARMONICS,
 };
 use crate::{
+    report_head::ReportHead,
     stage::{Check, Exporter, Loader, PointSeparator, Request, SourceKind},
-    summary::Limit,
+    summary::{Limit, Summary},
 };
 use diagnose::{Diagnose, DiagnoseConfig};
 use exports::{DIAGNOSIS, Exporting, Exports, beside_the_first, summary_path, written};
 use runout_table::TableSpec;
 use runout_turning::{
+    provenance::{Provenance, VERSION},
     rig::{Rig, RigConfig},
     separation::Assessment,
     surface::SurfaceConfig,
@@ -42,6 +44,8 @@ pub const INCLUDE_KEY: &str = "rig";
 pub struct Pipeline {
     /// For results and meshes.
     pub title: String,
+    /// What the head of a report says.
+    pub head: ReportHead,
     /// Sensors and setups; always there on the [`Route::Turns`].
     pub rig: Option<Rig>,
     /// The rig as it is configured, as a file of its own.
@@ -79,8 +83,9 @@ pub struct Pipeline {
     pub(super) in_data_set: bool,
 }
 
-const KEYS: [&str; 12] = [
+const KEYS: [&str; 13] = [
     "title",
+    "report",
     "rig",
     "load",
     "preprocess",
@@ -137,6 +142,10 @@ impl Pipeline {
                 None => return Err(Fault::span(value.span(), "expected the title in quotes")),
             },
         };
+        let head = table(root, "report")?
+            .map(|table| checked::<ReportHead, _>(&table, |head| head.check(sources.folder())))
+            .transpose()?
+            .unwrap_or_default();
         let rig_table = table(root, "rig")?;
         let rig = rig_table.as_ref().map(|table| checked::<RigConfig, _>(table, RigConfig::check)).transpose()?;
         let rig_text = rig_table.as_ref().map(document::table_text).transpose()?;
@@ -204,6 +213,7 @@ impl Pipeline {
         let Exports { exporters, diagnosed } = exporting.exports(&tables(root, "export")?, sources)?;
         Ok(Self {
             title,
+            head,
             rig,
             rig_text,
             loader,
@@ -226,6 +236,13 @@ impl Pipeline {
 }
 
 impl Pipeline {
+    /// A summary of nothing yet: title, head and what ran.
+    pub(super) fn headed(&self) -> Summary {
+        let (program, configuration) = (format!("runout {VERSION}"), self.configuration.clone());
+        let provenance = Provenance { program, configuration, ..Provenance::default() };
+        Summary { title: self.title.clone(), head: self.head.clone(), provenance, ..Summary::default() }
+    }
+
     /// What it wants of the files that are loaded.
     #[must_use]
     pub fn request(&self) -> Request<'_> {

@@ -302,15 +302,7 @@ impl<'a> Batch<'a> {
             })?;
         }
         report.trend = trend.into_series();
-        let summary = Summary {
-            title: self.pipeline.title.clone(),
-            provenance: Provenance {
-                program: program(),
-                configuration: self.pipeline.configuration.clone(),
-                inputs: Vec::new(),
-            },
-            ..Summary::default()
-        };
+        let summary = self.pipeline.headed();
         let overview = overview::of(&report);
         let completed = Completed {
             summary: &summary,
