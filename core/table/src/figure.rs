@@ -22,6 +22,9 @@ pub struct Figure {
     /// Limits that differ from place to place, which all panels show.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub lines: Vec<Line>,
+    /// Places along the horizontal axis that all panels name.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub named: Vec<(f64, String)>,
     /// Name of a table of [reference circles](crate::circles) about which the curves of a polar figure can be looked at; its rows have the
     /// same columns of names.
     #[serde(default)]
@@ -163,8 +166,8 @@ impl Figure {
     fn new(id: impl Into<String>, title: impl Into<String>, drawing: Drawing) -> Self {
         let (panels, curves) = (Vec::new(), Vec::new());
         let (id, title) = (id.into(), title.into());
-        let lines = Vec::new();
-        Self { id, title, panels, curves, only: None, places: None, level: None, lines, circles: None, drawing }
+        let (lines, named) = (Vec::new(), Vec::new());
+        Self { id, title, panels, curves, only: None, places: None, level: None, lines, named, circles: None, drawing }
     }
 
     /// Deviations about a reference circle.
@@ -265,6 +268,12 @@ impl Figure {
     #[must_use]
     pub fn level(self, name: impl Into<String>, value: f64) -> Self {
         Self { level: Some(Level { name: name.into(), value }), ..self }
+    }
+
+    /// The same with names at places along the horizontal axis.
+    #[must_use]
+    pub fn named(self, places: impl IntoIterator<Item = (f64, String)>) -> Self {
+        Self { named: places.into_iter().collect(), ..self }
     }
 
     /// Adds a limit that differs from place to place.

@@ -43,6 +43,8 @@ pub struct Panels {
     pub level: Option<Level>,
     /// Lines over every panel, in the same unit.
     pub lines: Vec<Line>,
+    /// Named places along the horizontal axis.
+    pub named: Vec<(f64, String)>,
     /// The three components of vectors; empty where none are drawn.
     pub vector: Vec<Axis>,
     /// Name of the table of reference circles.
@@ -172,6 +174,7 @@ impl Panels {
             places: Vec::new(),
             level: figure.level.clone(),
             lines: figure.lines.clone(),
+            named: figure.named.clone(),
             circles: figure.circles.clone(),
             vector,
             place_column: figure.places.clone(),

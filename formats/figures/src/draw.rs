@@ -107,7 +107,9 @@ fn cell(figure: &Panels, panel: &Panel, scale: f64, unit: &str) -> (Vec<Plot>, L
         .map(|curve| curve.thinned(MOST_POINTS, scale))
         .collect();
     let level = figure.level.as_ref().map(|level| (level.name.as_str(), scale * level.value));
-    let over = figure.lines.iter().map(|line| over(line, scale)).collect::<Vec<_>>();
+    let tallest = curves.iter().flat_map(|curve| &curve.points).map(|point| point.y).fold(0.0, f64::max);
+    let lines_over = figure.lines.iter().map(|line| over(line, scale));
+    let over = lines_over.chain(named(&figure.named, tallest)).collect::<Vec<_>>();
     let (plots, layout) = match figure.kind {
         Kind::Polar => polar(&curves, &axes[1]),
         Kind::Lines => lines(&curves, &axes, level),
@@ -253,6 +255,15 @@ fn over(line: &Line, scale: f64) -> Plot {
     Plot::Line(
         LinePlot::new().with_data(points).with_color(LIMIT).with_stroke_width(1.2).with_legend(line.name.clone()),
     )
+}
+
+/// A line from the bottom to the top at each named place, as far as orders are shown, with its name in the legend.
+fn named(places: &[(f64, String)], tallest: f64) -> impl Iterator<Item = Plot> {
+    let shown = places.iter().filter(|(at, _)| *at <= HIGHEST_ORDER);
+    shown.enumerate().map(move |(index, (at, name))| {
+        let line = LinePlot::new().with_data(vec![(*at, 0.0), (*at, tallest)]).with_color(colour(index + 2));
+        Plot::Line(line.with_stroke_width(0.8).with_legend(name.clone()))
+    })
 }
 
 /// Colours of marked points and of limits.

@@ -111,6 +111,16 @@ const Draw = (() => {
     return { shapes: [{ type: "line", xref: "paper", x0: 0, x1: 1, yref: "y", y0: at, y1: at, line, name: plain(name), showlegend: true }], showlegend: true };
   }
 
+  // Named places along the horizontal axis: a line from bottom to top, with its name.
+  function named(figure, chart) {
+    const { faint } = colours();
+    const places = figure.named ?? [];
+    const line = ([at]) => ({ type: "line", xref: "x", x0: at, x1: at, yref: "paper", y0: 0, y1: 1, line: { color: faint, width: 1, dash: "dot" } });
+    const name = ([at, text]) => ({ x: at, xref: "x", y: 1, yref: "paper", yanchor: "top", xanchor: "right", text: plain(text), textangle: -90, showarrow: false, font: { size: 10, color: faint } });
+    if (!places.length) return chart;
+    return { ...chart, shapes: [...(chart.shapes ?? []), ...places.map(line)], annotations: [...(chart.annotations ?? []), ...places.map(name)] };
+  }
+
   // Limits that differ from place to place.
   function over(figure) {
     const { ink } = colours();
@@ -235,7 +245,7 @@ const Draw = (() => {
       wide ? "logarithmic axis" : "",
       highest > FIRST_ORDERS ? `the first ${FIRST_ORDERS} of ${highest} orders` : "",
     ].filter(Boolean).join("; ");
-    return { traces, layout: layout({ xaxis, yaxis: axis(figure.y, yaxis), height: 380, barmode: "group", bargap: 0.25, ...level(figure) }), said };
+    return { traces, layout: named(figure, layout({ xaxis, yaxis: axis(figure.y, yaxis), height: 380, barmode: "group", bargap: 0.25, ...level(figure) })), said };
   }
 
   // A map's numbers: columns, rows, and heights row by row.

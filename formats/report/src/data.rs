@@ -51,6 +51,9 @@ pub(crate) struct FigureData {
     level: Option<LevelData>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     lines: Vec<LineData>,
+    /// Named places along x.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    named: Vec<(f64, String)>,
 }
 
 /// A line over every panel.
@@ -205,7 +208,20 @@ fn figure(figure: &Panels, most: usize) -> FigureData {
     let level = figure.level.as_ref();
     let level = level.map(|level| LevelData { name: one_line(&level.name), value: scale * level.value });
     let lines = figure.lines.iter().map(|line| line_data(line, scale)).collect();
-    FigureData { id: figure.id.clone(), title: figure.title.clone(), kind, x, y, panels, thinned, places, level, lines }
+    let named = figure.named.iter().map(|(at, name)| (*at, one_line(name))).collect();
+    FigureData {
+        id: figure.id.clone(),
+        title: figure.title.clone(),
+        kind,
+        x,
+        y,
+        panels,
+        thinned,
+        places,
+        level,
+        lines,
+        named,
+    }
 }
 
 fn line_data(line: &Line, scale: f64) -> LineData {

@@ -81,7 +81,7 @@ impl StationTables {
             reading: reading(),
             residual: residual(),
             values: values(),
-            turns: turn_tables::specs(),
+            turns: turn_tables::specs(rig.map_or(&[], |rig| &rig.bearings)),
             every: 1,
             taken: 0,
             line,
