@@ -132,16 +132,7 @@ impl Pipeline {
                 return Err(fault.help(known_names(key.get_ref(), KEYS)));
             }
         }
-        let title = match root.get_ref().get("title") {
-            None => "Untitled".to_owned(),
-            Some(value) => match value.get_ref().as_str() {
-                Some(title) if title.contains('\0') => {
-                    return Err(Fault::span(value.span(), "the title must not contain NUL, which ends a text in HDF5"));
-                }
-                Some(title) => title.to_owned(),
-                None => return Err(Fault::span(value.span(), "expected the title in quotes")),
-            },
-        };
+        let title = title(root)?;
         let head = table(root, "report")?
             .map(|table| checked::<ReportHead, _>(&table, |head| head.check(sources.folder())))
             .transpose()?
@@ -325,6 +316,17 @@ fn with_limits(mut tables: Vec<TableSpec>, limits: &[Limit]) -> Vec<TableSpec> {
         }
     }
     tables
+}
+
+fn title(root: &Table) -> Result<String, Fault> {
+    let Some(value) = root.get_ref().get("title") else { return Ok("Untitled".to_owned()) };
+    match value.get_ref().as_str() {
+        Some(title) if title.contains('\0') => {
+            Err(Fault::span(value.span(), "the title must not contain NUL, which ends a text in HDF5"))
+        }
+        Some(title) => Ok(title.to_owned()),
+        None => Err(Fault::span(value.span(), "expected the title in quotes")),
+    }
 }
 
 /// What is evaluated of a result, and the limits of it.
