@@ -209,8 +209,22 @@ pub struct CaptureSummary {
     pub rejected: Vec<RejectedTurnSummary>,
     /// Mean speed of the turns used.
     pub speed_rpm: Option<f64>,
+    /// Mean reading of each sensor.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub levels: Vec<LevelSummary>,
     /// Filters that the signal went through.
     pub filters: Vec<String>,
+}
+
+/// Mean reading of a sensor over the turns used.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct LevelSummary {
+    /// Id of the sensor.
+    pub sensor: String,
+    /// In µm.
+    pub mean_um: f64,
+    /// Its standard uncertainty from the scatter of the turns, in µm; null below two turns.
+    pub std_um: Option<f64>,
 }
 
 /// A turn that was left out.
