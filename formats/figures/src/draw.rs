@@ -236,7 +236,8 @@ fn bars(
     }
     plots.extend(level.map(|level| limit(level, curves, HIGHEST_ORDER)));
     plots.extend(over);
-    let layout = Layout::auto_from_plots(&plots).with_x_label("order / UPR").with_y_label(label(&axes[1]));
+    let layout =
+        Layout::auto_from_plots(&plots).with_x_label("order / UPR").with_x_axis_min(0.0).with_y_label(label(&axes[1]));
     (plots, layout)
 }
 

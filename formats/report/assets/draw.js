@@ -239,11 +239,13 @@ const Draw = (() => {
     const limits = over(figure);
     traces.push(...limits);
     const first = lowest || 1;
-    const xaxis = axis({ name: "order", unit: "UPR" }, { range: [first - 0.6, Math.min(highest, FIRST_ORDERS) + 0.6], tickformat: "d" });
+    // Named places are where there is something to see.
+    const shownOrders = figure.named ? Math.ceil(Math.max(...figure.named.map(([at]) => at))) + 4 : FIRST_ORDERS;
+    const xaxis = axis({ name: "order", unit: "UPR" }, { range: [(figure.named ? 0 : first - 0.6), Math.min(highest, shownOrders) + 0.6], tickformat: "d" });
     const yaxis = wide ? { type: "log", range: [Math.log10(lowestShown), Math.log10(1.5 * tallest)], dtick: 1, exponentformat: "power" } : { range: [0, 1.06 * tallest] };
     const said = [
       wide ? "logarithmic axis" : "",
-      highest > FIRST_ORDERS ? `the first ${FIRST_ORDERS} of ${highest} orders` : "",
+      highest > shownOrders ? `the first ${shownOrders} of ${highest} orders` : "",
     ].filter(Boolean).join("; ");
     return { traces, layout: named(figure, layout({ xaxis, yaxis: axis(figure.y, yaxis), height: 380, barmode: "group", bargap: 0.25, ...level(figure) })), said };
   }
