@@ -1,13 +1,14 @@
 //! `[[limit]]`: what values have to keep, and what was found of them.
 
-use crate::{
-    Orders, UpperCurve,
-    limit_curve::{UpperCurveSchema, single},
-    value::{PlacedValue, Value},
-};
+mod curve;
+
+use crate::value::{PlacedValue, Value};
+use curve::{UpperCurveSchema, single};
 use runout_error::{Error, Result, fault::known_names};
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize};
+
+pub use curve::{Orders, UpperCurve};
 
 /// `[[limit]]`: a limit of every value that it names. What it leaves open (section, reference, filter) it does not narrow: all
 /// values of the symbol have to keep it.

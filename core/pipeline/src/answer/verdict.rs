@@ -112,7 +112,7 @@ fn of_limits(summary: &Summary) -> Option<(String, Judgement)> {
         let order =
             |limit: &LimitSummary| limit.deciding().and_then(LimitValue::order).filter(|_| limit.values.len() > 1);
         let worst =
-            |limit: &LimitSummary| order(limit).map(|order| format!(", at order {order} first")).unwrap_or_default();
+            |limit: &LimitSummary| order(limit).map(|order| format!(", worst at order {order}")).unwrap_or_default();
         limits.map(|limit| limit_text(&limit.limit) + &worst(limit)).collect()
     };
     let (broken, undecided) = (named(Decision::DoesNotConform), named(Decision::Undecided));

@@ -6,12 +6,11 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    BearingConfig, Calibration, InterruptionConfig, Looks, Rig, Rotation, Sensor, Setup, Unit, interruption::gaps_of,
+    BearingConfig, Calibration, InterruptionConfig, Looks, Rig, Rotation, Sensor, Setup, Unit,
+    interruption::{gaps_of, radians},
 };
 use runout_error::Fault;
 
-/// A hundred turns: degrees above it are a mistake, and far above it they lose the digits within a turn.
-const LARGEST_DEG: f64 = 36_000.0;
 /// A kilometre: lengths above it are a mistake.
 const FARTHEST_MM: f64 = 1e6;
 /// Beyond, marks are of something else.
@@ -262,14 +261,6 @@ impl RigConfig {
         let bearings = bearings.map(checked).collect::<Result<_, _>>()?;
         Ok(Rig { part_radius_mm, rotation, sensors, setups, sections, gaps, faces, form_bounds_um, bearings })
     }
-}
-
-/// An angle in rad, or what is wrong with its degrees.
-pub(super) fn radians(angle_deg: f64) -> Result<f64, String> {
-    let possible = angle_deg.abs() <= LARGEST_DEG;
-    possible
-        .then(|| angle_deg.to_radians())
-        .ok_or_else(|| format!("expected an angle within ±{LARGEST_DEG}°, found {angle_deg:?}"))
 }
 
 impl SensorConfig {

@@ -3,12 +3,14 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Gaps, config::radians};
+use super::Gaps;
 use runout_error::Fault;
 
 /// Longer interruptions leave too little to bridge them by, in degrees.
 const MOST_INTERRUPTED_DEG: f64 = 120.0;
 
+/// A hundred turns: degrees above it are a mistake, and far above it they lose the digits within a turn.
+const LARGEST_DEG: f64 = 36_000.0;
 /// Share of a circle that has to be there.
 const LEAST_LEFT: f64 = 0.5;
 const ANGLES_LOOKED_AT: usize = 3600;
@@ -63,4 +65,12 @@ pub(super) fn gaps_of(
             format!("they leave less than half of section `{}`, too little to bridge them", sections[section]),
         )),
     }
+}
+
+/// An angle in rad, or what is wrong with its degrees.
+pub(super) fn radians(angle_deg: f64) -> Result<f64, String> {
+    let possible = angle_deg.abs() <= LARGEST_DEG;
+    possible
+        .then(|| angle_deg.to_radians())
+        .ok_or_else(|| format!("expected an angle within ±{LARGEST_DEG}°, found {angle_deg:?}"))
 }

@@ -11,7 +11,8 @@ use serde::{
     de::{Error as _, MapAccess, Visitor},
 };
 
-use crate::{Limit, LimitValue, PlacedValue, ValueId};
+use super::{Limit, LimitValue};
+use crate::value::{PlacedValue, ValueId};
 use formula::Formula;
 
 /// The symbol of the values that have an order each.
@@ -150,7 +151,7 @@ impl<'de> Deserialize<'de> for UpperCurve {
     }
 }
 
-/// [`UpperCurve`] for the schema.
+/// A formula in n, or amplitudes at orders.
 #[derive(JsonSchema)]
 #[serde(untagged)]
 #[allow(dead_code, reason = "only its schema is made")]
