@@ -1,7 +1,7 @@
 //! Pipelines to start from, one a separator: `runout new` writes them.
 
 /// Names of separators with the text of a pipeline that passes `runout check`.
-pub(crate) const TEMPLATES: [(&str, &str); 19] = [
+pub(crate) const TEMPLATES: [(&str, &str); 20] = [
     ("as-measured", include_str!("templates/as-measured.toml")),
     ("axial-reversal", include_str!("templates/axial-reversal.toml")),
     ("donaldson-reversal", include_str!("templates/donaldson-reversal.toml")),
@@ -13,6 +13,7 @@ pub(crate) const TEMPLATES: [(&str, &str); 19] = [
     ("quadrature", include_str!("templates/quadrature.toml")),
     ("positioning", include_str!("templates/positioning.toml")),
     ("circular", include_str!("templates/circular.toml")),
+    ("drift", include_str!("templates/drift.toml")),
     ("r-test", include_str!("templates/r-test.toml")),
     ("rotary-axis", include_str!("templates/rotary-axis.toml")),
     ("rotary-axis-circle-fit", include_str!("templates/rotary-axis-circle-fit.toml")),

@@ -12,7 +12,7 @@ from . import _toml
 from .errors import Error
 from .plugins import Own, checked, named
 from .recording import Points, Recording, Station
-from .tables import Diagnose, Evaluate, Limit, Rig, Surface
+from .tables import Diagnose, Evaluate, Limit, Report, Rig, Surface
 
 Stage = Union[Mapping[str, Any], Any]
 """An object of `runout.loaders`, `.preprocessors`, `.separators`, `.exporters` or `.checks`, or a dictionary with `plugin`. `separate` and `compare`
@@ -33,6 +33,7 @@ class Pipeline:
     evaluate: Union[Mapping[str, Any], Evaluate, None] = None
     limit: Sequence[Union[Mapping[str, Any], Limit]] = ()
     diagnose: Union[Mapping[str, Any], Diagnose, None] = None
+    report: Union[Mapping[str, Any], Report, None] = None
     export: Sequence[Stage] = ()
     check: Sequence[Stage] = ()
     folder: Union[str, os.PathLike[str]] = "."

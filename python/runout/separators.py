@@ -323,6 +323,19 @@ class Circular:
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
+class Drift:
+    """Thermal drift over hours by ISO 230-3: range of each axis and combined, time to stability"""
+
+    plugin: ClassVar[str] = "drift"
+
+    stable_um: Union[float, None] = None
+    """How far from its last position an axis is stable, in µm; without it a tenth of its own range."""
+
+    window_s: Union[float, None] = None
+    """Readings are averaged over so many seconds: vibration is no drift. Default: 60.0."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
 class RotorModes:
     """Natural frequencies, Campbell diagram and critical speeds of a rotor"""
 

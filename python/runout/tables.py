@@ -14,6 +14,9 @@ from typing import Any, ClassVar, Literal, Union
 class Rig:
     """`[rig]` as written in a file."""
 
+    bearings: Union[Sequence[Mapping[str, Any]], None] = None
+    """The spindle's rolling bearings: lines of asynchronous motion that fit one are named."""
+
     interruptions: Union[Sequence[Mapping[str, Any]], None] = None
     """Where the surface is interrupted: a keyway, a cross hole. Readings there are bridged, and no value is taken there."""
 
@@ -116,6 +119,9 @@ class Limit:
     lower: Union[float, None] = None
     """The smallest value that may be, in `unit`."""
 
+    orders: Union[str, None] = None
+    """Orders that it is of, both ends included: "2..50". Of `amplitude` alone, which is computed for these orders then."""
+
     reference: Union[str, None] = None
     """What the value is referred to: "LSCI", "MZCI", "LSCY"; all without it."""
 
@@ -130,6 +136,10 @@ class Limit:
 
     upper: Union[float, None] = None
     """The largest value that may be, in `unit`."""
+
+    upper_curve: Union[Union[str, Mapping[str, Any]], None] = None
+    """The largest amplitude of each order, in `unit`, in place of `upper`: a formula in n, "2.4 / n^1.5", or amplitudes at orders,
+    { 2 = 0.8, 50 = 0.02 }, between which it is a straight line of both logarithms."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -156,3 +166,33 @@ class Diagnose:
 
     path: Union[str, None] = None
     """Where `diagnosis.json` goes; beside the first export of the final model without it."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Report:
+    """`[report]`: what the head of a report says. Everything may be left out."""
+
+    calibrated: Union[str, None] = None
+    """When the instrument was calibrated: 2026-03-01."""
+
+    customer: Union[str, None] = None
+    """For whom."""
+
+    fields: Union[Mapping[str, Any], None] = None
+    """Whatever else the head has to say, by name: { Order = "4711" }."""
+
+    instrument: Union[str, None] = None
+    """The instrument."""
+
+    logo: Union[str, None] = None
+    """An image file (PNG, JPEG, GIF, WebP or SVG, at most 256 KiB), relative to the TOML; in results the image itself as a data
+    URI."""
+
+    machine: Union[str, None] = None
+    """The machine or spindle that was measured."""
+
+    operator: Union[str, None] = None
+    """Who measured."""
+
+    serial_number: Union[str, None] = None
+    """Its serial number."""

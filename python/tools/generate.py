@@ -21,7 +21,7 @@ MODULES = {
     "exporters": ("export", "From results to files."),
     "checks": ("check", "What `check` compares a pipeline with."),
 }
-TABLES = ("rig", "surface", "evaluate", "limit", "diagnose")
+TABLES = ("rig", "surface", "evaluate", "limit", "diagnose", "report")
 HEAD = '''"""{about}
 
 Generated from schemas/ by python/tools/generate.py: every class has the keys of its table in TOML. A key that is None is left out.

@@ -32,6 +32,7 @@ pub fn four_sensors(setups: &[(f64, f64)]) -> RigConfig {
     };
     RigConfig {
         interruptions: Vec::new(),
+        bearings: Vec::new(),
         part_radius_mm: 30.0,
         rotation: Rotation::Ccw,
         sensors: vec![

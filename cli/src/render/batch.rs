@@ -6,6 +6,8 @@ use super::{count, number::significant, page::Page, table::Table};
 
 /// Rows of a table of the trend: all are in the file.
 const SHOWN: usize = 20;
+/// Rows of values against the speed: those of a station with its shift.
+const SPEED_SHOWN: usize = 60;
 /// Recordings from which on control limits are usual (ISO 7870-2 asks for 20 to 25 subgroups).
 const ENOUGH: usize = 20;
 /// Digits of values and limits.
@@ -28,6 +30,7 @@ pub(crate) fn text(report: &BatchReport) -> String {
     page.line(counts.join(", "));
     page.headed_table("Limits, recordings that are proven to keep them or not", &limits(report));
     trend(&mut page, report);
+    against_speed(&mut page, report);
     let other = report.other_configuration.len();
     if other > 0 {
         let names: Vec<&str> = report.other_configuration.iter().take(SHOWN).map(String::as_str).collect();
@@ -112,6 +115,20 @@ fn trend(page: &mut Page, report: &BatchReport) {
     page.bullets("Signals", &sorted.iter().take(SHOWN).map(first).collect::<Vec<_>>());
     if recordings < ENOUGH {
         page.line(format_args!("  Limits from fewer than {ENOUGH} recordings are preliminary (ISO 7870-2)."));
+    }
+}
+
+/// Values at the lowest and at the highest speed, and the largest ones.
+fn against_speed(page: &mut Page, report: &BatchReport) {
+    let mut table = Table::new(1, ["value", "lowest rpm", "value", "highest rpm", "value", "largest at rpm", "value"]);
+    for series in report.against_speed.iter().take(SPEED_SHOWN) {
+        let at = [series.slowest, series.fastest, series.largest].into_iter().flatten();
+        table.row(std::iter::once(series.series.clone()).chain(at.map(|number| significant(number, 4))));
+    }
+    page.headed_table("Error motion against the speed", &table);
+    let more = report.against_speed.len().saturating_sub(SPEED_SHOWN);
+    if more > 0 {
+        page.line(format_args!("  … and {more} more in the table speed"));
     }
 }
 

@@ -25,6 +25,7 @@ mod report;
 mod rotor;
 mod safety;
 mod schemas;
+mod speed;
 mod straightness;
 mod text_recording;
 mod values;

@@ -86,6 +86,34 @@ fn a_run_writes_a_report_and_an_earlier_result_gives_the_same() {
     assert_eq!(elements(&page(&folder.path().join("again.html"))), elements(&written));
 }
 
+/// Machine, customer and logo are in the page's head, in the summary and in the page of an earlier result.
+#[test]
+fn the_head_says_what_was_measured_for_whom() {
+    let folder = spindle(false);
+    let head = "[report]\nmachine = \"VMC <5>\"\ncalibrated = 2026-03-01\nlogo = \"logo.svg\"\nfields = { Order = \"4711\" }\n\n[load]";
+    let pipeline = page(&folder.path().join("pipeline.toml")).replacen("[load]", head, 1);
+    fs::write(folder.path().join("pipeline.toml"), pipeline).unwrap();
+    let missing = folder.run(&["run", "pipeline.toml"]);
+    assert!(
+        missing.status == 2 && missing.stderr.contains("cannot read") && missing.stderr.contains("logo.svg"),
+        "{}",
+        missing.stderr
+    );
+    fs::write(folder.path().join("logo.svg"), "<svg xmlns='http://www.w3.org/2000/svg'/>").unwrap();
+    let ran = folder.run(&["run", "pipeline.toml", "--json"]);
+    assert_eq!(ran.status, 0, "{}", ran.stderr);
+    let written = elements(&page(&folder.path().join("out/report.html")));
+    let (before, _) = written.split_once("role=\"status\"").unwrap();
+    for part in ["VMC &lt;5&gt;", "Calibrated", "2026-03-01", "Order", "4711", "src=\"data:image/svg+xml;base64,"] {
+        assert!(before.contains(part), "{part}");
+    }
+    let summary: serde_json::Value = serde_json::from_str(&ran.stdout).unwrap();
+    assert_eq!([&summary["head"]["machine"], &summary["head"]["fields"]["Order"]], ["VMC <5>", "4711"]);
+    let again = folder.run(&["report", "out/result.h5", "--out", "again.html"]);
+    assert_eq!(again.status, 0, "{}", again.stderr);
+    assert_eq!(elements(&page(&folder.path().join("again.html"))), written);
+}
+
 #[test]
 fn hostile_names_stay_names() {
     let folder = spindle(true);

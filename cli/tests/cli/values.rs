@@ -89,6 +89,80 @@ fn limits_are_decided_and_end_the_program_only_when_asked() {
     assert!(table.stdout.contains("low_95"), "{}", table.stdout);
 }
 
+const CURVE: &str = r#"
+[[limit]]
+symbol = "amplitude"
+section = "a"
+orders = "2..30"
+upper_curve = "3 / n"
+unit = "um"
+
+[[export]]
+plugin = "csv"
+path = "out/values.csv"
+
+[[export]]
+plugin = "figures"
+path = "figures"
+formats = ["svg"]
+"#;
+
+/// A form to order 20, of orders of which the layout loses some: each order has its own limit, and the worst comes first.
+#[test]
+fn a_limit_curve_is_decided_order_by_order() {
+    let folder = campaign(CURVE);
+    let ran = folder.run(&["run", "pipeline.toml", "--json"]);
+    assert_eq!((ran.status, ran.stderr.as_str()), (0, ""));
+    let summary: Value = serde_json::from_str(&ran.stdout).unwrap();
+    let values = summary["limits"][0]["values"].as_array().unwrap();
+    assert_eq!(values.len(), 2 * 29, "two stations, orders 2 to 30");
+    let mut worst = (0.0, 0);
+    for value in values {
+        let order = value["band_upr"][0].as_u64().unwrap();
+        let upper = value["upper"].as_f64().unwrap();
+        assert!((upper * order as f64 - 3.0).abs() < 1e-9, "{value}");
+        let decision = value["decision"].as_str().unwrap();
+        let Some(interval) = value["interval_95"].as_array() else {
+            assert!(
+                value["value"].is_null() && value["missing"].as_str().unwrap().contains("not observable"),
+                "{value}"
+            );
+            assert_eq!(decision, "undecided");
+            continue;
+        };
+        let [low, high] = [0, 1].map(|end| interval[end].as_f64().unwrap());
+        let expected = if high <= upper {
+            "conforms"
+        } else if low > upper {
+            "does-not-conform"
+        } else {
+            "undecided"
+        };
+        assert_eq!(decision, expected, "{value}");
+        if high / upper > worst.0 {
+            worst = (high / upper, order);
+        }
+    }
+    assert!(worst.0 > 1.0, "a form of 4 µm rms breaks the curve: {worst:?}");
+    let shown = folder.run(&["run", "pipeline.toml"]).stdout;
+    let first = shown.lines().skip_while(|line| !line.contains("Not proven")).nth(1).unwrap();
+    assert!(first.contains(&format!("order {}", worst.1)), "{worst:?} in {first}");
+    assert!(shown.lines().nth(1).unwrap().contains("amplitude of orders 2..30 of section a ≤ 3 / n µm"), "{shown}");
+    let csv = std::fs::read_to_string(folder.path().join("out/values.csv")).unwrap();
+    let of_curve = csv.lines().filter(|line| line.contains("amplitude") && line.contains(",1.5,")).count();
+    assert_eq!(of_curve, 2, "order 2 of two stations has the limit 1.5:\n{csv}");
+    let drawn = std::fs::read_to_string(folder.path().join("figures/form-harmonics.svg")).unwrap();
+    assert!(drawn.contains("limit of section a"));
+    for (key, wrong, said) in [
+        ("orders", "50..2", "ascending orders"),
+        ("upper_curve", "3 / m", "found `m`"),
+        ("upper_curve", "3 - n", "found 0 at order 3"),
+    ] {
+        let refused = folder.run(&["run", "pipeline.toml", "--set", &format!("limit.0.{key}={wrong}")]);
+        assert!(refused.status == 2 && refused.stderr.contains(said), "{}", refused.stderr);
+    }
+}
+
 #[test]
 fn warnings_end_the_program_only_when_asked() {
     let folder = campaign("");

@@ -36,7 +36,7 @@ pub use config::{ArealFilter, Evaluate, EvaluateConfig, FormRemoval, Group};
 pub use evaluables::Evaluated;
 pub use generatrix::add_generatrices;
 pub use key::key_symbols;
-pub use limit::{Decision, Limit, LimitSummary, LimitValue, decide};
+pub use limit::{Decision, Limit, LimitSummary, LimitValue, Orders, UpperCurve, decide, nan_for_null};
 pub use part::{PartSummary, part_summary};
 pub use section::section_values;
 pub use station::EvaluatedStation;

@@ -1,9 +1,14 @@
 //! `[[limit]]`: what values have to keep, and what was found of them.
 
+mod curve;
+
 use crate::value::{PlacedValue, Value, ValueId};
+use curve::{UpperCurveSchema, single};
 use runout_error::{Error, Result, fault::known_names};
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
+
+pub use curve::{Orders, UpperCurve};
 
 /// `[[limit]]`: a limit of every value that it names. What it leaves open (section, reference, filter) it does not narrow: all
 /// values of the symbol have to keep it.
@@ -23,6 +28,14 @@ pub struct Limit {
     pub lower: Option<f64>,
     /// The largest value that may be, in `unit`.
     pub upper: Option<f64>,
+    /// Orders that it is of, both ends included: "2..50". Of `amplitude` alone, which is computed for these orders then.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub orders: Option<Orders>,
+    /// The largest amplitude of each order, in `unit`, in place of `upper`: a formula in n, "2.4 / n^1.5", or amplitudes at orders,
+    /// { 2 = 0.8, 50 = 0.02 }, between which it is a straight line of both logarithms.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<UpperCurveSchema>")]
+    pub upper_curve: Option<UpperCurve>,
     /// Unit of the limits, which is the value's: "um".
     pub unit: String,
 }
@@ -67,8 +80,13 @@ pub struct LimitValue {
     /// these.
     #[serde(default)]
     pub band_upr: [usize; 2],
-    /// The number.
+    /// The number; null of an order that is lost.
+    #[serde(deserialize_with = "nan_for_null")]
+    #[schemars(with = "Option<f64>")]
     pub value: f64,
+    /// Its own upper limit, where the limit differs from order to order; absent otherwise.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub upper: Option<f64>,
     /// Where the truth lies with 95 % probability; null where that is not known.
     pub interval_95: Option<[f64; 2]>,
     /// Whether the number itself keeps the limits.
@@ -78,6 +96,31 @@ pub struct LimitValue {
     /// Why nothing is proven: what of its band is not in the value, or why no uncertainty is stated; null otherwise.
     #[serde(default)]
     pub missing: Option<String>,
+}
+
+/// NaN, which JSON has no number for, is written as null.
+///
+/// # Errors
+/// When it is neither a number nor null.
+pub fn nan_for_null<'de, D: Deserializer<'de>>(deserializer: D) -> std::result::Result<f64, D::Error> {
+    Ok(Option::deserialize(deserializer)?.unwrap_or(f64::NAN))
+}
+
+impl LimitSummary {
+    /// Of the values that the decision follows from, the one nearest to a limit, or farthest beyond it: of an undecided limit a value that is
+    /// undecided itself, so that its reason is that of the decision.
+    #[must_use]
+    pub fn deciding(&self) -> Option<&LimitValue> {
+        self.by_risk().into_iter().find(|value| value.decision == self.decision)
+    }
+
+    /// All values, those nearest to breaking the limit first.
+    #[must_use]
+    pub fn by_risk(&self) -> Vec<&LimitValue> {
+        let mut values: Vec<&LimitValue> = self.values.iter().collect();
+        values.sort_by(|a, b| a.room(&self.limit).total_cmp(&b.room(&self.limit)));
+        values
+    }
 }
 
 impl LimitValue {
@@ -102,10 +145,48 @@ impl LimitValue {
         if words.is_empty() { "whole part".to_owned() } else { words.join(", ") }
     }
 
-    /// Reference and filter: "MZCI, Gaussian 50 UPR"; empty of a domain's own value.
+    /// The order that it is of, where it is of one.
+    #[must_use]
+    pub fn order(&self) -> Option<usize> {
+        single(self.band_upr)
+    }
+
+    /// Lower and upper limit of the value.
+    #[must_use]
+    pub fn ends(&self, limit: &Limit) -> [Option<f64>; 2] {
+        [limit.lower, self.upper.or(limit.upper)]
+    }
+
+    /// How far its interval keeps away from the limits, below 0 where it does not: of one that differs from order to order as a share of it.
+    #[must_use]
+    pub fn room(&self, limit: &Limit) -> f64 {
+        let [from, to] = self.interval_95.unwrap_or([self.value; 2]);
+        let [lower, upper] = self.ends(limit);
+        let above = lower.map_or(f64::INFINITY, |lower| from - lower);
+        let below = upper.map_or(f64::INFINITY, |upper| upper - to);
+        above.min(below / self.upper.unwrap_or(1.0))
+    }
+
+    /// The same section's value of an order that is lost.
+    pub(crate) fn lost(&self, order: usize, upper: Option<f64>, reason: String) -> Self {
+        Self {
+            band_upr: [order; 2],
+            value: f64::NAN,
+            upper: self.upper.and(upper),
+            interval_95: None,
+            within: false,
+            decision: Decision::Undecided,
+            missing: Some(reason),
+            ..self.clone()
+        }
+    }
+
+    /// Order, reference and filter: "order 7", "MZCI, Gaussian 50 UPR"; empty of a domain's own value.
     #[must_use]
     pub fn by(&self) -> String {
-        [&self.reference, &self.filter].into_iter().flatten().map(String::as_str).collect::<Vec<_>>().join(", ")
+        let order = self.order().map(|order| format!("order {order}"));
+        let all = [&order, &self.reference, &self.filter].into_iter().flatten();
+        all.map(String::as_str).collect::<Vec<_>>().join(", ")
     }
 }
 
@@ -114,16 +195,18 @@ impl Limit {
     #[must_use]
     pub fn name(&self) -> String {
         let end = |sign: &str, end: Option<f64>| end.map(|end| format!("{sign} {end}")).unwrap_or_default();
-        let ends = [end("≥", self.lower), end("≤", self.upper)];
+        let curve = self.upper_curve.as_ref().map(|curve| format!("≤ {curve}"));
+        let ends = [end("≥", self.lower), curve.unwrap_or_else(|| end("≤", self.upper))];
         let ends: Vec<&str> = ends.iter().map(String::as_str).filter(|end| !end.is_empty()).collect();
         let of =
             |word: &str, what: &Option<String>| what.as_ref().map(|what| format!(" {word}{what}")).unwrap_or_default();
         let (reference, section) = (of("", &self.reference), of("of section ", &self.section));
         let filter = of("filter ", &self.filter);
-        format!("{}{reference}{filter}{section} {} {}", self.symbol, ends.join(" and "), self.unit)
+        let orders = self.orders.map(|orders| format!(" of orders {orders}")).unwrap_or_default();
+        format!("{}{reference}{filter}{orders}{section} {} {}", self.symbol, ends.join(" and "), self.unit)
     }
 
-    /// Whether it is one of this value, which is `of` a section or of what a domain's own values are of.
+    /// Whether it is one of this value, which is `of` a section or of what a domain's own values are of, and where it has `orders` of one of them.
     #[must_use]
     pub fn names(&self, id: &ValueId) -> bool {
         // "LSCY" is also "LSCY of centred sections".
@@ -132,14 +215,16 @@ impl Limit {
             rest.is_some_and(|rest| rest.is_empty() || rest.starts_with(" of "))
         });
         let is_asked = |asked: &Option<String>, found: Option<&str>| asked.is_none() || asked.as_deref() == found;
-        id.symbol == self.symbol && referred && is_asked(&self.section, id.of) && is_asked(&self.filter, id.filter)
+        let here = is_asked(&self.section, id.of) && self.is_of_band(id.band_upr);
+        id.symbol == self.symbol && referred && here && is_asked(&self.filter, id.filter)
     }
 }
 
 impl Limit {
     fn decide(&self, placed: &PlacedValue) -> LimitValue {
         let value = placed.value;
-        let [low, high] = [self.lower.unwrap_or(f64::NEG_INFINITY), self.upper.unwrap_or(f64::INFINITY)];
+        let upper = self.upper_at(value.band_upr[0]);
+        let [low, high] = [self.lower.unwrap_or(f64::NEG_INFINITY), upper.unwrap_or(f64::INFINITY)];
         let interval_95 = value.interval_95();
         let refuted = value.refuted_by.as_ref().map(|by| format!("its own data refute the value: {by}"));
         let missing = refuted.or_else(|| missing(value));
@@ -156,6 +241,7 @@ impl Limit {
             filter: value.filter.clone(),
             band_upr: value.band_upr,
             value: value.value,
+            upper: upper.filter(|_| self.upper_curve.is_some()),
             interval_95,
             within: value.value >= low && value.value <= high,
             decision,
@@ -225,7 +311,8 @@ pub fn decide(limits: &[Limit], all: &[PlacedValue]) -> Result<(Vec<LimitSummary
     let decide = |limit: &Limit| {
         // What is not observable is not there to keep a limit.
         let named = all.iter().filter(|placed| limit.names(&placed.id()) && placed.value.value.is_finite());
-        let values: Vec<LimitValue> = named.map(|placed| limit.decide(placed)).collect();
+        let mut values: Vec<LimitValue> = named.map(|placed| limit.decide(placed)).collect();
+        values.extend(limit.without_amplitude(&values, all));
         if values.is_empty() {
             let mut symbols: Vec<&str> = all.iter().map(|placed| &*placed.value.symbol).collect();
             symbols.sort_unstable();

@@ -39,6 +39,7 @@ impl Limit {
             }
             _ => Ok(()),
         };
+        self.check_orders()?;
         known("filter", &self.filter, evaluate.filter_names())?;
         let symbols = |of: &dyn Fn(&runout_standards::roundness::Reference) -> &'static str| {
             evaluate.references.iter().map(|reference| of(reference).to_owned()).collect()
@@ -76,7 +77,9 @@ impl Limit {
             }
         }
         match (self.lower, self.upper) {
-            (None, None) => Err(Fault::here("a limit needs `upper`, `lower` or both")),
+            (None, None) if self.upper_curve.is_none() => {
+                Err(Fault::here("a limit needs `upper`, `lower` or both, or `upper_curve`"))
+            }
             (Some(lower), Some(upper)) if lower > upper => {
                 Err(Fault::at("upper", format!("expected a limit from lower = {lower} on, found {upper}")))
             }

@@ -25,6 +25,7 @@ pub mod effects;
 pub mod length_unit;
 pub mod pipeline;
 pub mod points;
+pub mod report_head;
 pub mod stage;
 pub mod summary;
 

@@ -3,12 +3,14 @@
 mod reported;
 
 pub use reported::ReportedValue;
+use runout_evaluate::nan_for_null;
 pub use runout_evaluate::{Decision, Limit, LimitSummary, LimitValue, PartSummary, PlacedValue, Value};
 
 use std::{collections::BTreeMap, path::PathBuf};
 
+use crate::report_head::ReportHead;
 use schemars::JsonSchema;
-use serde::{Deserialize, Deserializer, Serialize};
+use serde::{Deserialize, Serialize};
 
 use runout_closed_loop::{correction::Correction, diagnosis};
 use runout_consistency::{Check, Test, refuted_by};
@@ -20,6 +22,9 @@ use runout_turning::{provenance::Provenance, reading::ReadingValues, separation:
 pub struct Summary {
     /// The pipeline's title.
     pub title: String,
+    /// What the head of a report says; absent where the pipeline has no [report].
+    #[serde(default, skip_serializing_if = "ReportHead::is_empty")]
+    pub head: ReportHead,
     /// Enough to repeat the run.
     pub provenance: Provenance,
     /// Effects that the results are corrected for: what `diagnose` added, and what `[diagnose] known` declares. Those of a run
@@ -225,8 +230,22 @@ pub struct CaptureSummary {
     pub rejected: Vec<RejectedTurnSummary>,
     /// Mean speed of the turns used.
     pub speed_rpm: Option<f64>,
+    /// Mean reading of each sensor.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub levels: Vec<LevelSummary>,
     /// Filters that the signal went through.
     pub filters: Vec<String>,
+}
+
+/// Mean reading of a sensor over the turns used.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct LevelSummary {
+    /// Id of the sensor.
+    pub sensor: String,
+    /// In µm.
+    pub mean_um: f64,
+    /// Its standard uncertainty from the scatter of the turns, in µm; null below two turns.
+    pub std_um: Option<f64>,
 }
 
 /// A turn that was left out.
@@ -257,11 +276,6 @@ pub struct SectionSummary {
     pub values: Vec<Value>,
     /// True error of the form (root mean square over observable orders from 2), where the truth is known.
     pub truth_form_rms_error_um: Option<f64>,
-}
-
-/// NaN, which JSON has no number for, is written as null.
-fn nan_for_null<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
-    Ok(Option::deserialize(deserializer)?.unwrap_or(f64::NAN))
 }
 
 /// True errors of the motion: root mean square over observable orders from 2.

@@ -19,6 +19,12 @@ pub struct Figure {
     pub places: Option<String>,
     /// A limit that all panels show.
     pub level: Option<Level>,
+    /// Limits that differ from place to place, which all panels show.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub lines: Vec<Line>,
+    /// Places along the horizontal axis that all panels name.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub named: Vec<(f64, String)>,
     /// Name of a table of [reference circles](crate::circles) about which the curves of a polar figure can be looked at; its rows have the
     /// same columns of names.
     #[serde(default)]
@@ -34,6 +40,15 @@ pub struct Level {
     pub name: String,
     /// Its height, in the unit of the values.
     pub value: f64,
+}
+
+/// A line over every panel.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Line {
+    /// Its name: `limit`.
+    pub name: String,
+    /// Its points, along the horizontal axis and, in the unit of the values, along the vertical one.
+    pub points: Vec<[f64; 2]>,
 }
 
 /// How rows are drawn. All fields name columns of the figure's table; rows with NaN or null are left out.
@@ -151,7 +166,8 @@ impl Figure {
     fn new(id: impl Into<String>, title: impl Into<String>, drawing: Drawing) -> Self {
         let (panels, curves) = (Vec::new(), Vec::new());
         let (id, title) = (id.into(), title.into());
-        Self { id, title, panels, curves, only: None, places: None, level: None, circles: None, drawing }
+        let (lines, named) = (Vec::new(), Vec::new());
+        Self { id, title, panels, curves, only: None, places: None, level: None, lines, named, circles: None, drawing }
     }
 
     /// Deviations about a reference circle.
@@ -252,6 +268,17 @@ impl Figure {
     #[must_use]
     pub fn level(self, name: impl Into<String>, value: f64) -> Self {
         Self { level: Some(Level { name: name.into(), value }), ..self }
+    }
+
+    /// The same with names at places along the horizontal axis.
+    #[must_use]
+    pub fn named(self, places: impl IntoIterator<Item = (f64, String)>) -> Self {
+        Self { named: places.into_iter().collect(), ..self }
+    }
+
+    /// Adds a limit that differs from place to place.
+    pub fn add_line(&mut self, name: impl Into<String>, points: Vec<[f64; 2]>) {
+        self.lines.push(Line { name: name.into(), points });
     }
 
     /// The same with the reference circles in a table.

@@ -15,7 +15,7 @@ use runout_error::{Error, Result};
 
 use crate::{
     TableSpec,
-    figure::{Figure, Level},
+    figure::{Figure, Level, Line},
 };
 pub use arrows::Arrow;
 pub use circles::Circle;
@@ -41,6 +41,10 @@ pub struct Panels {
     pub places: Vec<(f64, String)>,
     /// A horizontal line across every panel, in the unit of the vertical axis before it is [scaled](Self::scaled).
     pub level: Option<Level>,
+    /// Lines over every panel, in the same unit.
+    pub lines: Vec<Line>,
+    /// Named places along the horizontal axis.
+    pub named: Vec<(f64, String)>,
     /// The three components of vectors; empty where none are drawn.
     pub vector: Vec<Axis>,
     /// Name of the table of reference circles.
@@ -169,6 +173,8 @@ impl Panels {
             drawn: Vec::new(),
             places: Vec::new(),
             level: figure.level.clone(),
+            lines: figure.lines.clone(),
+            named: figure.named.clone(),
             circles: figure.circles.clone(),
             vector,
             place_column: figure.places.clone(),

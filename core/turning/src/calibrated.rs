@@ -84,7 +84,9 @@ mod tests {
         ];
         let setups = vec![SetupConfig { id: "a".into(), ..SetupConfig::default() }];
         let rotation = Rotation::Ccw;
-        RigConfig { part_radius_mm: 30.0, rotation, sensors, setups, interruptions: Vec::new() }.check().unwrap()
+        RigConfig { part_radius_mm: 30.0, rotation, sensors, setups, interruptions: Vec::new(), bearings: Vec::new() }
+            .check()
+            .unwrap()
     }
 
     /// The channels are in another order than the rig's sensors: S2 is in µm, S1 in volts.

@@ -93,6 +93,7 @@ mod tests {
         let setup = |(id, part_deg): (&str, f64)| SetupConfig { id: id.into(), part_deg, ..SetupConfig::default() };
         let mut config = SpindleConfig::new(RigConfig {
             interruptions: Vec::new(),
+            bearings: Vec::new(),
             part_radius_mm: 30.0,
             rotation: Rotation::Ccw,
             sensors: [("S1", 0.0), ("S2", 99.844), ("S3", 202.5)].into_iter().map(sensor).collect(),

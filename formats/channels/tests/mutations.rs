@@ -84,6 +84,7 @@ fn record(path: &Path, mut suggestion: Suggestion) {
     let setups: Vec<SetupConfig> = suggestion.setups.iter().map(|[id, _]| setup(id)).collect();
     let rig = RigConfig {
         interruptions: Vec::new(),
+        bearings: Vec::new(),
         part_radius_mm: 30.0,
         rotation: <_>::default(),
         sensors: suggestion.channels.iter().map(sensor).collect(),

@@ -35,6 +35,7 @@ pub(crate) fn rig(setups: &[&str], unit: Unit) -> Rig {
     let setup = |id: &&str| SetupConfig { id: (*id).into(), ..SetupConfig::default() };
     let config = RigConfig {
         interruptions: Vec::new(),
+        bearings: Vec::new(),
         part_radius_mm: 30.0,
         rotation: <_>::default(),
         sensors: vec![sensor("S1", 1), sensor("S2", -1)],

@@ -218,6 +218,7 @@ mod tests {
         };
         let config = RigConfig {
             interruptions: Vec::new(),
+            bearings: Vec::new(),
             part_radius_mm: 30.0,
             rotation: Rotation::Ccw,
             sensors: vec![sensor("S1", 1), sensor("S2", -1)],

@@ -28,6 +28,7 @@ fn rig(setups: &[&str]) -> Rig {
     let setup = |id: &&str| SetupConfig { id: (*id).into(), ..SetupConfig::default() };
     let config = RigConfig {
         interruptions: Vec::new(),
+        bearings: Vec::new(),
         part_radius_mm: 30.0,
         rotation: Rotation::Ccw,
         sensors: vec![sensor("S1", 1), sensor("Fühler", -1)],

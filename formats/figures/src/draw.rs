@@ -12,7 +12,10 @@ use kuva::{
 };
 use runout_core::{
     surface::Surface,
-    table::panels::{Axis, Curve, Grid, Kind, Panel, Panels, Point},
+    table::{
+        figure::Line,
+        panels::{Axis, Curve, Grid, Kind, Panel, Panels, Point},
+    },
 };
 
 pub(crate) use kuva::render::render::Scene;
@@ -104,13 +107,16 @@ fn cell(figure: &Panels, panel: &Panel, scale: f64, unit: &str) -> (Vec<Plot>, L
         .map(|curve| curve.thinned(MOST_POINTS, scale))
         .collect();
     let level = figure.level.as_ref().map(|level| (level.name.as_str(), scale * level.value));
+    let tallest = curves.iter().flat_map(|curve| &curve.points).map(|point| point.y).fold(0.0, f64::max);
+    let lines_over = figure.lines.iter().map(|line| over(line, scale));
+    let over = lines_over.chain(named(&figure.named, tallest)).collect::<Vec<_>>();
     let (plots, layout) = match figure.kind {
         Kind::Polar => polar(&curves, &axes[1]),
         Kind::Lines => lines(&curves, &axes, level),
         Kind::Points => points(&curves, &axes),
         // Eccentricity is no form, and high orders are noise.
-        Kind::Amplitudes => bars(&curves, &axes, 2.0, level),
-        Kind::Bars => bars(&curves, &axes, 0.0, level),
+        Kind::Amplitudes => bars(&curves, &axes, 2.0, level, over),
+        Kind::Bars => bars(&curves, &axes, 0.0, level, over),
         Kind::Vectors => vectors::draw(panel, &axes, figure),
         Kind::Map => {
             let points = panel.curves.iter().flat_map(|curve| curve.points.iter().copied()).collect::<Vec<_>>();
@@ -213,7 +219,13 @@ fn points(curves: &[Curve], axes: &[Axis; 2]) -> (Vec<Plot>, Layout) {
 }
 
 /// The first orders, side by side.
-fn bars(curves: &[Curve], axes: &[Axis; 2], lowest_order: f64, level: Option<(&str, f64)>) -> (Vec<Plot>, Layout) {
+fn bars(
+    curves: &[Curve],
+    axes: &[Axis; 2],
+    lowest_order: f64,
+    level: Option<(&str, f64)>,
+    over: Vec<Plot>,
+) -> (Vec<Plot>, Layout) {
     let mut plots = Vec::new();
     let width = 0.6 / curves.len().max(1) as f64;
     for (index, curve) in curves.iter().enumerate() {
@@ -223,7 +235,9 @@ fn bars(curves: &[Curve], axes: &[Axis; 2], lowest_order: f64, level: Option<(&s
         plots.push(Plot::Lollipop(if curve.name.is_empty() { plot } else { plot.with_legend(curve.name.clone()) }));
     }
     plots.extend(level.map(|level| limit(level, curves, HIGHEST_ORDER)));
-    let layout = Layout::auto_from_plots(&plots).with_x_label("order / UPR").with_y_label(label(&axes[1]));
+    plots.extend(over);
+    let layout =
+        Layout::auto_from_plots(&plots).with_x_label("order / UPR").with_x_axis_min(0.0).with_y_label(label(&axes[1]));
     (plots, layout)
 }
 
@@ -233,6 +247,24 @@ fn limit((name, value): (&str, f64), curves: &[Curve], highest: f64) -> Plot {
     let (from, to) = places.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
     let line = vec![(from, value), (to.min(highest), value)];
     Plot::Line(LinePlot::new().with_data(line).with_color(LIMIT).with_stroke_width(1.2).with_legend(name))
+}
+
+/// A limit that differs from order to order, as far as orders are shown.
+fn over(line: &Line, scale: f64) -> Plot {
+    let shown = line.points.iter().filter(|point| point[0] <= HIGHEST_ORDER);
+    let points = shown.map(|[x, y]| (*x, scale * y)).collect::<Vec<_>>();
+    Plot::Line(
+        LinePlot::new().with_data(points).with_color(LIMIT).with_stroke_width(1.2).with_legend(line.name.clone()),
+    )
+}
+
+/// A line from the bottom to the top at each named place, as far as orders are shown, with its name in the legend.
+fn named(places: &[(f64, String)], tallest: f64) -> impl Iterator<Item = Plot> {
+    let shown = places.iter().filter(|(at, _)| *at <= HIGHEST_ORDER);
+    shown.enumerate().map(move |(index, (at, name))| {
+        let line = LinePlot::new().with_data(vec![(*at, 0.0), (*at, tallest)]).with_color(colour(index + 2));
+        Plot::Line(line.with_stroke_width(0.8).with_legend(name.clone()))
+    })
 }
 
 /// Colours of marked points and of limits.

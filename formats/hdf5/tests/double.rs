@@ -27,6 +27,7 @@ pub(crate) fn rig() -> Rig {
     let setup = |id: &str| SetupConfig { id: id.into(), ..SetupConfig::default() };
     let config = RigConfig {
         interruptions: Vec::new(),
+        bearings: Vec::new(),
         part_radius_mm: 30.0,
         rotation: Rotation::Ccw,
         sensors: vec![sensor("S1", 1), sensor("S2", -1)],

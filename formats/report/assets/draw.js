@@ -111,6 +111,25 @@ const Draw = (() => {
     return { shapes: [{ type: "line", xref: "paper", x0: 0, x1: 1, yref: "y", y0: at, y1: at, line, name: plain(name), showlegend: true }], showlegend: true };
   }
 
+  // Named places along the horizontal axis: a line from bottom to top, with its name.
+  function named(figure, chart) {
+    const { faint } = colours();
+    const places = figure.named ?? [];
+    const line = ([at]) => ({ type: "line", xref: "x", x0: at, x1: at, yref: "paper", y0: 0, y1: 1, line: { color: faint, width: 1, dash: "dot" } });
+    const name = ([at, text]) => ({ x: at, xref: "x", y: 1, yref: "paper", yanchor: "top", xanchor: "right", text: plain(text), textangle: -90, showarrow: false, font: { size: 10, color: faint } });
+    if (!places.length) return chart;
+    return { ...chart, shapes: [...(chart.shapes ?? []), ...places.map(line)], annotations: [...(chart.annotations ?? []), ...places.map(name)] };
+  }
+
+  // Limits that differ from place to place.
+  function over(figure) {
+    const { ink } = colours();
+    return (figure.lines ?? []).map(({ name, x, y }) => ({
+      type: "scatter", mode: "lines", x: numbers(x), y: numbers(y), name: plain(name), line: { color: ink, width: 1.2, dash: "dash" }, meta: "limit", showlegend: true,
+      hovertemplate: `order %{x}: limit %{y} ${figure.y.unit}<extra></extra>`,
+    }));
+  }
+
   const MOST_PLACES = 30; // Names beside each other below a chart.
 
   // The horizontal axis, with the names of its places where there are some.
@@ -217,14 +236,18 @@ const Draw = (() => {
         marker: { color: "rgba(0,0,0,0)", line: { width: 0 }, pattern: { shape: "/", fgcolor: faint, size: 6 } }, showlegend: true,
       });
     }
+    const limits = over(figure);
+    traces.push(...limits);
     const first = lowest || 1;
-    const xaxis = axis({ name: "order", unit: "UPR" }, { range: [first - 0.6, Math.min(highest, FIRST_ORDERS) + 0.6], tickformat: "d" });
+    // Named places are where there is something to see.
+    const shownOrders = figure.named ? Math.ceil(Math.max(...figure.named.map(([at]) => at))) + 4 : FIRST_ORDERS;
+    const xaxis = axis({ name: "order", unit: "UPR" }, { range: [(figure.named ? 0 : first - 0.6), Math.min(highest, shownOrders) + 0.6], tickformat: "d" });
     const yaxis = wide ? { type: "log", range: [Math.log10(lowestShown), Math.log10(1.5 * tallest)], dtick: 1, exponentformat: "power" } : { range: [0, 1.06 * tallest] };
     const said = [
       wide ? "logarithmic axis" : "",
-      highest > FIRST_ORDERS ? `the first ${FIRST_ORDERS} of ${highest} orders` : "",
+      highest > shownOrders ? `the first ${shownOrders} of ${highest} orders` : "",
     ].filter(Boolean).join("; ");
-    return { traces, layout: layout({ xaxis, yaxis: axis(figure.y, yaxis), height: 380, barmode: "group", bargap: 0.25, ...level(figure) }), said };
+    return { traces, layout: named(figure, layout({ xaxis, yaxis: axis(figure.y, yaxis), height: 380, barmode: "group", bargap: 0.25, ...level(figure) })), said };
   }
 
   // A map's numbers: columns, rows, and heights row by row.

@@ -2,7 +2,10 @@
 
 use runout_core::{
     surface::Surface,
-    table::panels::{Axis, Curve, Grid, Kind, Panels, Point},
+    table::{
+        figure::Line,
+        panels::{Axis, Curve, Grid, Kind, Panels, Point},
+    },
 };
 use serde::Serialize;
 
@@ -46,6 +49,19 @@ pub(crate) struct FigureData {
     places: Vec<(f64, String)>,
     #[serde(skip_serializing_if = "Option::is_none")]
     level: Option<LevelData>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    lines: Vec<LineData>,
+    /// Named places along x.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    named: Vec<(f64, String)>,
+}
+
+/// A line over every panel.
+#[derive(Serialize)]
+struct LineData {
+    name: String,
+    x: Numbers,
+    y: Numbers,
 }
 
 /// A horizontal line across every panel.
@@ -191,7 +207,27 @@ fn figure(figure: &Panels, most: usize) -> FigureData {
     let places = figure.places.iter().map(|(x, name)| (*x, one_line(name))).collect();
     let level = figure.level.as_ref();
     let level = level.map(|level| LevelData { name: one_line(&level.name), value: scale * level.value });
-    FigureData { id: figure.id.clone(), title: figure.title.clone(), kind, x, y, panels, thinned, places, level }
+    let lines = figure.lines.iter().map(|line| line_data(line, scale)).collect();
+    let named = figure.named.iter().map(|(at, name)| (*at, one_line(name))).collect();
+    FigureData {
+        id: figure.id.clone(),
+        title: figure.title.clone(),
+        kind,
+        x,
+        y,
+        panels,
+        thinned,
+        places,
+        level,
+        lines,
+        named,
+    }
+}
+
+fn line_data(line: &Line, scale: f64) -> LineData {
+    let [x, y]: [Vec<f64>; 2] = [0, 1].map(|axis| line.points.iter().map(|point| point[axis]).collect());
+    let y: Vec<f64> = y.into_iter().map(|y| scale * y).collect();
+    LineData { name: one_line(&line.name), x: Numbers::of(&x), y: Numbers::of(&y) }
 }
 
 fn curve(curve: &Curve) -> CurveData {

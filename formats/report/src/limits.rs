@@ -29,7 +29,7 @@ pub(crate) fn section(limits: &[LimitSummary]) -> Markup {
             @for limit in limits {
                 @let (decision, class) = word(limit.decision);
                 h3 { bdi { (limit_text(&limit.limit)) } " " span.badge.(class) { (decision) } }
-                @let sorted = by_risk(limit);
+                @let sorted = limit.by_risk();
                 @if sorted.is_empty() { p { "No value has this name." } }
                 @if !sorted.is_empty() { (table(&limit.limit, &sorted[..sorted.len().min(SHOWN)])) }
                 @if sorted.len() > SHOWN {
@@ -50,33 +50,19 @@ pub(crate) fn section(limits: &[LimitSummary]) -> Markup {
 /// A limit as a row: its name, the value nearest to breaking it, and the decision.
 pub(crate) fn worst(limit: &LimitSummary) -> Markup {
     let (decision, class) = word(limit.decision);
-    let sorted = by_risk(limit);
-    // The reason of the decision is that of a value that it follows from.
-    let deciding = sorted.iter().find(|value| value.decision == limit.decision);
+    let deciding = limit.deciding();
     html! {
         tr {
             td {
                 bdi { (limit_text(&limit.limit)) }
+                @if let Some(order) = deciding.and_then(LimitValue::order) { ": order " (order) }
                 @if let Some(missing) = deciding.and_then(|value| value.missing.as_ref()) { br; small { (missing) } }
             }
             td.number { @if let Some(value) = deciding { (digits(value.value, value)) } }
-            td { @if let Some(value) = deciding { (bar(&limit.limit, value, word(value.decision).1)) } }
+            td { @if let Some(value) = deciding.filter(|value| value.value.is_finite()) { (bar(&limit.limit, value, word(value.decision).1)) } }
             td { span.badge.(class) { (decision) } }
         }
     }
-}
-
-/// Values, those nearest to breaking the limit first.
-fn by_risk(limit: &LimitSummary) -> Vec<&LimitValue> {
-    let Limit { lower, upper, .. } = limit.limit;
-    let room = |value: &LimitValue| {
-        let [low, high] = value.interval_95.unwrap_or([value.value; 2]);
-        let room = |end: Option<f64>| end.unwrap_or(f64::INFINITY);
-        room(upper.map(|upper| upper - high)).min(room(lower.map(|lower| low - lower)))
-    };
-    let mut values: Vec<&LimitValue> = limit.values.iter().collect();
-    values.sort_by(|a, b| room(a).total_cmp(&room(b)));
-    values
 }
 
 fn table(limit: &Limit, values: &[&LimitValue]) -> Markup {
@@ -85,7 +71,7 @@ fn table(limit: &Limit, values: &[&LimitValue]) -> Markup {
             table.limits {
                 thead {
                     tr {
-                        th { "where" } th { "reference, filter" } th.number { "value / " (symbol(&limit.unit)) }
+                        th { "where" } th { @if limit.orders.is_some() { "order, " } "reference, filter" } th.number { "value / " (symbol(&limit.unit)) }
                         th.number { "95 % interval" } th { "beside the tolerance" } th { "" }
                     }
                 }
@@ -100,7 +86,7 @@ fn table(limit: &Limit, values: &[&LimitValue]) -> Markup {
                                 @if let Some([low, high]) = value.interval_95 { (digits(low, value)) " … " (digits(high, value)) }
                                 @else { "unknown" }
                             }
-                            td { (bar(limit, value, class)) }
+                            td { @if value.value.is_finite() { (bar(limit, value, class)) } }
                             td {
                                 span.badge.(class) { (decision) }
                                 @if let Some(missing) = &value.missing { br; small { (missing) } }
@@ -128,8 +114,9 @@ fn digits(number: f64, value: &LimitValue) -> String {
 fn bar(limit: &Limit, value: &LimitValue, class: &str) -> Markup {
     const WIDTH: f64 = 220.0;
     let [low, high] = value.interval_95.unwrap_or([value.value; 2]);
-    let lower = limit.lower.unwrap_or_else(|| low.min(0.0).min(limit.upper.unwrap_or(0.0)));
-    let upper = limit.upper.unwrap_or_else(|| high.max(limit.lower.unwrap_or(high)) * 1.2);
+    let ends = value.ends(limit);
+    let lower = ends[0].unwrap_or_else(|| low.min(0.0).min(ends[1].unwrap_or(0.0)));
+    let upper = ends[1].unwrap_or_else(|| high.max(ends[0].unwrap_or(high)) * 1.2);
     let (from, to) = (lower.min(low), upper.max(high));
     let margin = 0.06 * (to - from).max(f64::MIN_POSITIVE);
     let (from, to) = (from - margin, to + margin);
@@ -139,8 +126,8 @@ fn bar(limit: &Limit, value: &LimitValue, class: &str) -> Markup {
     html! {
         svg.bar viewBox="0 0 220 22" role="img" aria-label="value and 95 % interval beside the tolerance" {
             rect.tolerance x=(x(lower)) y="3" width=(width(lower, upper, 0.0)) height="16" {}
-            @if limit.lower.is_some() { line.end x1=(x(lower)) x2=(x(lower)) y1="1" y2="21" {} }
-            @if limit.upper.is_some() { line.end x1=(x(upper)) x2=(x(upper)) y1="1" y2="21" {} }
+            @if ends[0].is_some() { line.end x1=(x(lower)) x2=(x(lower)) y1="1" y2="21" {} }
+            @if ends[1].is_some() { line.end x1=(x(upper)) x2=(x(upper)) y1="1" y2="21" {} }
             rect.(class) x=(x(low)) y="8" width=(width(low, high, 2.0)) height="6" {}
             line.value x1=(x(value.value)) x2=(x(value.value)) y1="4" y2="18" {}
         }

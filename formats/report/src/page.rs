@@ -44,7 +44,14 @@ pub(crate) fn page(title: &str, figures: &[Panels], result: &Completed) -> Resul
     let lead = usize::from(answer.is_some() && !drawn.is_empty());
     let body = html! {
         header {
+            @if let Some(logo) = summary.head.logo.as_ref().filter(|logo| logo.starts_with("data:image/")) {
+                img.logo src=(logo) alt="Logo";
+            }
             h1 { bdi { (title) } }
+            @let head = summary.head.entries();
+            @if !head.is_empty() {
+                dl.facts.head { @for (name, text) in &head { div { dt { bdi { (name) } } dd { bdi { (text) } } } } }
+            }
             @if !verdict.is_empty() { p.verdict.(class) role="status" { bdi { (verdict) } } }
         }
         @if let Some(answer) = &answer { (first::screen(answer, summary, drawn.first().map(|figure| chart(0, figure)))) }

@@ -50,13 +50,14 @@ impl<'a> Cell<'a> {
 }
 
 /// Names of the columns, with the width of a sheet's column in characters.
-const COLUMNS: [(&str, u16); 17] = [
+const COLUMNS: [(&str, u16); 18] = [
     ("station", 12),
     ("of", 16),
     ("z_mm", 10),
     ("symbol", 18),
     ("reference", 22),
     ("filter", 20),
+    ("order", 8),
     ("value", 12),
     ("unit", 8),
     ("std", 12),
@@ -74,8 +75,8 @@ const COLUMNS: [(&str, u16); 17] = [
 fn row<'a>(value: &ReportedValue<'a>) -> [Cell<'a>; COLUMNS.len()] {
     let (reported, value) = (value, value.value());
     let (place, id) = (reported.placed, reported.placed.id());
-    let limit = reported.limit.map(|(limit, _)| limit);
     let [low, high] = value.interval_95().map_or([None; 2], |ends| ends.map(Some));
+    let [lower, upper] = reported.limit.map_or([None; 2], |(limit, found)| found.ends(limit));
     [
         Cell::text(place.station),
         Cell::text(id.of),
@@ -83,14 +84,15 @@ fn row<'a>(value: &ReportedValue<'a>) -> [Cell<'a>; COLUMNS.len()] {
         Cell::text(Some(id.symbol)),
         Cell::text(id.reference),
         Cell::text(id.filter),
+        Cell::number(id.order().map(|order| order as f64)),
         Cell::number(value.number()),
         Cell::text(Some(&value.unit)),
         Cell::number(value.std()),
         Cell::number(low),
         Cell::number(high),
         Cell::text(value.uncertainty.as_ref().map(|known| known.kind.name())),
-        Cell::number(limit.and_then(|limit| limit.lower)),
-        Cell::number(limit.and_then(|limit| limit.upper)),
+        Cell::number(lower),
+        Cell::number(upper),
         Cell::text(decision(reported).map(decision_name)),
         Cell::text(reported.remark()),
         Cell::text(Some(&value.source)),

@@ -93,7 +93,21 @@ fn contents(summary: &Summary, config: &QDasConfig) -> Vec<u8> {
     field("K0100", &values.len().to_string());
     field("K1001", config.part_number.as_deref().unwrap_or_default());
     field("K1002", config.part.as_ref().unwrap_or(&summary.title));
-    field("K1900", &format!("{}; um and urad: micrometres and microradians", summary.provenance.program));
+    let head = &summary.head;
+    let known = [
+        ("K1062", &head.customer),
+        ("K1081", &head.serial_number),
+        ("K1082", &head.machine),
+        ("K1202", &head.instrument),
+        ("K1222", &head.operator),
+    ];
+    for (key, text) in known {
+        field(key, text.as_deref().unwrap_or_default());
+    }
+    let mut remarks = vec![format!("{}; um and urad: micrometres and microradians", summary.provenance.program)];
+    remarks.extend(head.calibrated.as_ref().map(|date| format!("instrument calibrated {date}")));
+    remarks.extend(head.fields.iter().map(|(name, text)| format!("{name}: {text}")));
+    field("K1900", &remarks.join("; "));
     for (index, (value, _)) in values.iter().enumerate() {
         let number = index + 1;
         let mut of_value = |key: &str, content: &str| field(&format!("{key}/{number}"), content);
@@ -102,8 +116,9 @@ fn contents(summary: &Summary, config: &QDasConfig) -> Vec<u8> {
         of_value("K2003", &value.value().symbol);
         of_value("K2004", "0");
         of_value("K2022", &digits(value.value().std()).to_string());
-        if let Some((limit, _)) = value.limit {
-            for (limit_key, kind_key, end) in [("K2110", "K2120", limit.lower), ("K2111", "K2121", limit.upper)] {
+        if let Some((limit, found)) = value.limit {
+            let [lower, upper] = found.ends(limit);
+            for (limit_key, kind_key, end) in [("K2110", "K2120", lower), ("K2111", "K2121", upper)] {
                 let end = end.map(|end| end.to_string()).unwrap_or_default();
                 of_value(kind_key, if end.is_empty() { "" } else { "1" });
                 of_value(limit_key, &end);
@@ -125,10 +140,7 @@ fn contents(summary: &Summary, config: &QDasConfig) -> Vec<u8> {
 fn description(value: &ReportedValue) -> String {
     let station = value.placed.station.map(|station| format!(", station {station}")).unwrap_or_default();
     // The band is said where it alone distinguishes values: harmonics of one order.
-    let order = match value.value().band_upr {
-        [low, high] if low == high && low > 0 => format!(", order {low}"),
-        _ => String::new(),
-    };
+    let order = value.value().id().order().map(|order| format!(", order {order}")).unwrap_or_default();
     format!("{}{order}{station}", value.placed.id())
 }
 

@@ -171,6 +171,7 @@ fn write_about(sheet: &mut Worksheet, tables: &[TableSpec], result: &Completed) 
         ["program".into(), summary.provenance.program.clone()],
         ["convention".into(), result.about.convention.clone()],
     ];
+    lines.extend(summary.head.entries().into_iter().map(|(name, text)| [name.to_owned(), text.to_owned()]));
     lines.extend(result.about.notes.iter().map(|(name, text)| [name.clone(), text.clone()]));
     let inputs = summary.provenance.inputs.iter();
     lines.extend(inputs.map(|input| ["input".into(), format!("{}, BLAKE3 {}", input.path, input.blake3)]));

@@ -47,6 +47,8 @@ fn summary() -> Summary {
             { "symbol": "offset", "value": null, "std": null, "unit": "mm", "about": "not observable" },
         ],
         "warnings": ["order 4 is lost"],
+        "head": { "machine": "VMC 5", "serial_number": "0815", "operator": "A. B.", "instrument": "laser L1", "calibrated": "2026-03-01",
+            "customer": "C & Co", "fields": { "Order": "4712" } },
     });
     let mut summary: Summary = serde_json::from_value(whole).unwrap();
     let limit = serde_json::from_value(json!({ "symbol": "RONt", "unit": "um", "upper": UPPER_UM })).unwrap();
@@ -153,6 +155,10 @@ fn xlsx_has_values_and_the_tables_that_were_asked_for() {
     assert_eq!((form.height(), form.get((1, 1)), form.get((2, 1))), (3, Some(&Data::Float(0.25)), Some(&Data::Empty)));
     let about = book.worksheet_range("about").unwrap();
     let texts: Vec<String> = about.rows().map(|row| row[1].to_string()).collect();
+    let named = |name: &str| about.rows().find(|row| row[0] == Data::String(name.into())).map(|row| row[1].to_string());
+    let head = ["Machine", "Serial number", "Operator", "Instrument", "Calibrated", "Customer", "Order"];
+    let said = ["VMC 5", "0815", "A. B.", "laser L1", "2026-03-01", "C & Co", "4712"];
+    assert_eq!(head.map(|name| named(name).unwrap()), said);
     for text in ["Welle süd", "outward positive", "order 4 is lost", "deviation [um]", "plugin = 'csv'"] {
         assert!(texts.iter().any(|known| known == text), "{text}: {texts:?}");
     }
@@ -180,6 +186,9 @@ fn q_das_has_a_characteristic_for_each_value_with_a_limit() {
     let (fields, values) = read_q_das(&text);
     let field = |key: &str| fields.get(key).map(String::as_str);
     assert_eq!([field("K0100"), field("K1001"), field("K1002")], [Some("3"), Some("4711"), Some("Welle süd")]);
+    let head = ["K1062", "K1081", "K1082", "K1202", "K1222"].map(|key| field(key).unwrap());
+    assert_eq!(head, ["C & Co", "0815", "VMC 5", "laser L1", "A. B."]);
+    assert!(field("K1900").unwrap().ends_with("; instrument calibrated 2026-03-01; Order: 4712"));
     assert_eq!(field("K2002/2"), Some("RONt about LSCI, Gaussian 50 UPR of b, station s1"));
     for number in 1..=3 {
         let of = |key: &str| field(&format!("{key}/{number}")).map(str::to_owned);

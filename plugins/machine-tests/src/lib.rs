@@ -4,9 +4,11 @@
 //! | --- | --- |
 //! | `positioning` | ISO 230-2: accuracy and repeatability of positioning of one axis |
 //! | `circular` | ISO 230-4: circular deviation, radial deviation and hysteresis of a circular path |
+//! | `drift` | ISO 230-3: thermal drift, range of each axis and combined, time to stability |
 
 mod circular;
 mod draws;
+mod drift;
 mod paths;
 mod positioning;
 mod runs;
@@ -14,10 +16,12 @@ mod runs;
 use runout_core::pipeline::{Plugin, Registry};
 
 pub use circular::CircularConfig;
+pub use drift::DriftConfig;
 pub use positioning::PositioningConfig;
 
 /// Adds the separators.
 pub fn register(registry: &mut Registry) {
     registry.separators.add(Plugin::of::<PositioningConfig>());
     registry.separators.add(Plugin::of::<CircularConfig>());
+    registry.separators.add(Plugin::of::<DriftConfig>());
 }

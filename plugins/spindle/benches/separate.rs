@@ -31,6 +31,7 @@ fn rig() -> Rig {
     };
     let config = RigConfig {
         interruptions: Vec::new(),
+        bearings: Vec::new(),
         part_radius_mm: 30.0,
         rotation: Rotation::Cw,
         sensors: SENSORS_DEG.iter().enumerate().map(sensor).collect(),

@@ -70,6 +70,7 @@ fn config(rotation: Rotation, sensors: Vec<SensorConfig>, part_deg: &[f64]) -> R
         sensors,
         setups: part_deg.iter().enumerate().map(setup).collect(),
         interruptions: Vec::new(),
+        bearings: Vec::new(),
     }
 }
 

@@ -21,6 +21,7 @@ fn capture(setup: &str, rejected: usize) -> CaptureSummary {
         trimmed: vec!["3 turns: start-up".into()],
         rejected: (10..10 + rejected).map(turn).collect(),
         speed_rpm: Some(500.02),
+        levels: Vec::new(),
         filters: vec!["low-pass, −3 dB at 451 Hz".into()],
     }
 }

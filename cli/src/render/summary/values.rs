@@ -34,7 +34,7 @@ pub(crate) fn part(page: &mut Page, summary: &Summary) {
 pub(crate) fn limits(page: &mut Page, summary: &Summary) {
     let mut table = Table::new(2, ["limit", "decision", "values", "proven", "the worst", "95 % interval"]);
     for limit in &summary.limits {
-        let worst = deciding(limit);
+        let worst = limit.deciding();
         let proven = limit.values.iter().filter(|value| value.decision == Decision::Conforms).count();
         let interval = worst.and_then(|value| value.interval_95);
         table.row([
@@ -42,13 +42,13 @@ pub(crate) fn limits(page: &mut Page, summary: &Summary) {
             decided(limit, worst),
             limit.values.len().to_string(),
             proven.to_string(),
-            known(worst.map(|value| value.value), 4),
+            known(worst.map(|value| value.value), 4) + &worst.map(order).unwrap_or_default(),
             interval.map_or_else(String::new, |ends| ends.map(|end| significant(end, 4)).join(" to ")),
         ]);
     }
     page.headed_table("Limits", &table);
     let beyond = summary.limits.iter().flat_map(|limit| {
-        let open = limit.values.iter().filter(|value| value.decision != Decision::Conforms);
+        let open = limit.by_risk().into_iter().filter(|value| value.decision != Decision::Conforms);
         open.map(|value| format!("{}: {}", limit_text(&limit.limit), place(value)))
     });
     let mut beyond: Vec<String> = beyond.collect();
@@ -73,23 +73,20 @@ fn decided(limit: &LimitSummary, worst: Option<&LimitValue>) -> String {
     }
 }
 
-/// Of the values that the decision follows from, the one nearest to a limit, or farthest beyond it: of an undecided limit a value that is
-/// undecided itself, so that its reason is that of the decision.
-fn deciding(limit: &LimitSummary) -> Option<&LimitValue> {
-    let room = |value: &LimitValue| {
-        let [from, to] = value.interval_95.unwrap_or([value.value; 2]);
-        let above = limit.limit.lower.map_or(f64::INFINITY, |lower| from - lower);
-        let below = limit.limit.upper.map_or(f64::INFINITY, |upper| upper - to);
-        above.min(below)
-    };
-    let decide = limit.values.iter().filter(|value| value.decision == limit.decision);
-    decide.min_by(|a, b| room(a).total_cmp(&room(b)))
+/// " (order 7)" of a value of one order.
+fn order(value: &LimitValue) -> String {
+    value.order().map(|order| format!(" (order {order})")).unwrap_or_default()
 }
 
-/// "s31, section a, MZCI, 5.31".
+/// "s31, section a, MZCI, 5.31"; of an order its limit too, or why it has no number.
 fn place(value: &LimitValue) -> String {
     let by = value.by().trim_end_matches(", none").to_owned();
-    let words = [value.place(), by, significant(value.value, 4)];
+    let number = match (value.value.is_nan(), &value.missing, value.upper) {
+        (true, Some(missing), _) => missing.clone(),
+        (_, _, Some(upper)) => format!("{} of {}", significant(value.value, 4), significant(upper, 4)),
+        _ => significant(value.value, 4),
+    };
+    let words = [value.place(), by, number];
     words.into_iter().filter(|word| !word.is_empty()).collect::<Vec<_>>().join(", ")
 }
 
@@ -109,6 +106,7 @@ mod tests {
             filter: Some("none".into()),
             band_upr: [2, 63],
             value: 0.5 * (interval_95[0] + interval_95[1]),
+            upper: None,
             interval_95: Some(interval_95),
             within: true,
             decision,
@@ -133,7 +131,7 @@ mod tests {
         ] {
             let document = serde_json::json!({ "limit": limit, "decision": decision, "values": values });
             let summary: LimitSummary = serde_json::from_value(document).unwrap();
-            let deciding = deciding(&summary);
+            let deciding = summary.deciding();
             assert!(deciding.is_none_or(|value| value.decision == decision));
             assert_eq!(decided(&summary, deciding), said);
         }

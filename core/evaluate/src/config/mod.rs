@@ -21,7 +21,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 use texture::Texture;
 
-use super::Limit;
+use super::{Limit, Orders};
 use crate::error_motion::{self, Centre};
 use crate::evaluable::EvaluableKind;
 use runout_numerics::filter::Kind as FilterKind;
@@ -201,6 +201,15 @@ impl Evaluate {
         if !self.of_closed && self.areal.form == FormRemoval::Cylinder {
             self.areal.form = FormRemoval::Plane;
         }
+    }
+
+    /// Adds the amplitudes that a limit of these orders needs.
+    pub fn add_amplitudes(&mut self, orders: Orders) {
+        if self.of_closed && !self.has(Group::Harmonics) {
+            self.groups.push(Group::Harmonics);
+            self.harmonics_upr = orders.last;
+        }
+        self.harmonics_upr = self.harmonics_upr.max(orders.last);
     }
 
     /// One more limit.

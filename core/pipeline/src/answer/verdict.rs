@@ -1,6 +1,6 @@
 //! The verdict in one sentence.
 
-use crate::summary::{Decision, Limit, Summary};
+use crate::summary::{Decision, Limit, LimitSummary, LimitValue, Summary};
 use runout_closed_loop::diagnosis::{self, Diagnosis};
 use runout_table::number::{significant, spread, unit_text};
 
@@ -109,7 +109,11 @@ fn of_data(summary: &Summary) -> (String, Judgement) {
 fn of_limits(summary: &Summary) -> Option<(String, Judgement)> {
     let named = |decision| -> Vec<String> {
         let limits = summary.limits.iter().filter(|limit| limit.decision == decision);
-        limits.map(|limit| limit_text(&limit.limit)).collect()
+        let order =
+            |limit: &LimitSummary| limit.deciding().and_then(LimitValue::order).filter(|_| limit.values.len() > 1);
+        let worst =
+            |limit: &LimitSummary| order(limit).map(|order| format!(", worst at order {order}")).unwrap_or_default();
+        limits.map(|limit| limit_text(&limit.limit) + &worst(limit)).collect()
     };
     let (broken, undecided) = (named(Decision::DoesNotConform), named(Decision::Undecided));
     let all = summary.limits.len();

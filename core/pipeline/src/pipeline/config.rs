@@ -19,15 +19,18 @@ pub use schema::{PlainTable, choice, pipeline_schema, plain_tables};
 use super::{
     document::{self, ConfigError, Document, Sources, Table, checked, required, table, tables},
     registry::{Context, Registry},
+    tables::FORM_HARMONICS,
 };
 use crate::{
+    report_head::ReportHead,
     stage::{Check, Exporter, Loader, PointSeparator, Request, SourceKind},
-    summary::Limit,
+    summary::{Limit, Summary},
 };
 use diagnose::{Diagnose, DiagnoseConfig};
 use exports::{DIAGNOSIS, Exporting, Exports, beside_the_first, summary_path, written};
 use runout_table::TableSpec;
 use runout_turning::{
+    provenance::{Provenance, VERSION},
     rig::{Rig, RigConfig},
     separation::Assessment,
     surface::SurfaceConfig,
@@ -41,6 +44,8 @@ pub const INCLUDE_KEY: &str = "rig";
 pub struct Pipeline {
     /// For results and meshes.
     pub title: String,
+    /// What the head of a report says.
+    pub head: ReportHead,
     /// Sensors and setups; always there on the [`Route::Turns`].
     pub rig: Option<Rig>,
     /// The rig as it is configured, as a file of its own.
@@ -78,8 +83,9 @@ pub struct Pipeline {
     pub(super) in_data_set: bool,
 }
 
-const KEYS: [&str; 12] = [
+const KEYS: [&str; 13] = [
     "title",
+    "report",
     "rig",
     "load",
     "preprocess",
@@ -126,16 +132,11 @@ impl Pipeline {
                 return Err(fault.help(known_names(key.get_ref(), KEYS)));
             }
         }
-        let title = match root.get_ref().get("title") {
-            None => "Untitled".to_owned(),
-            Some(value) => match value.get_ref().as_str() {
-                Some(title) if title.contains('\0') => {
-                    return Err(Fault::span(value.span(), "the title must not contain NUL, which ends a text in HDF5"));
-                }
-                Some(title) => title.to_owned(),
-                None => return Err(Fault::span(value.span(), "expected the title in quotes")),
-            },
-        };
+        let title = title(root)?;
+        let head = table(root, "report")?
+            .map(|table| checked::<ReportHead, _>(&table, |head| head.check(sources.folder())))
+            .transpose()?
+            .unwrap_or_default();
         let rig_table = table(root, "rig")?;
         let rig = rig_table.as_ref().map(|table| checked::<RigConfig, _>(table, RigConfig::check)).transpose()?;
         let rig_text = rig_table.as_ref().map(document::table_text).transpose()?;
@@ -191,7 +192,7 @@ impl Pipeline {
             .map(|table| registry.checks.build(table, &context))
             .collect::<Result<_, _>>()?;
         let evaluate = evaluate(root, &route, rig.as_ref(), assessment.as_ref())?;
-        let of_result = route.tables(assessment.as_ref(), rig.as_ref());
+        let of_result = with_limits(route.tables(assessment.as_ref(), rig.as_ref()), evaluate.limits());
         let exporting = Exporting {
             registry,
             context: &context,
@@ -203,6 +204,7 @@ impl Pipeline {
         let Exports { exporters, diagnosed } = exporting.exports(&tables(root, "export")?, sources)?;
         Ok(Self {
             title,
+            head,
             rig,
             rig_text,
             loader,
@@ -225,6 +227,13 @@ impl Pipeline {
 }
 
 impl Pipeline {
+    /// A summary of nothing yet: title, head and what ran.
+    pub(super) fn headed(&self) -> Summary {
+        let (program, configuration) = (format!("runout {VERSION}"), self.configuration.clone());
+        let provenance = Provenance { program, configuration, ..Provenance::default() };
+        Summary { title: self.title.clone(), head: self.head.clone(), provenance, ..Summary::default() }
+    }
+
     /// What it wants of the files that are loaded.
     #[must_use]
     pub fn request(&self) -> Request<'_> {
@@ -295,6 +304,31 @@ fn named_files(root: &Table, folder: &Path) -> Vec<PathBuf> {
     found
 }
 
+/// The tables of a result with the limits of its harmonics in their figure.
+fn with_limits(mut tables: Vec<TableSpec>, limits: &[Limit]) -> Vec<TableSpec> {
+    let figures = tables.iter_mut().flat_map(|table| &mut table.figures);
+    for figure in figures.filter(|figure| figure.id == FORM_HARMONICS) {
+        for limit in limits {
+            let Some(orders) = limit.orders else { continue };
+            let points = (orders.first..=orders.last).filter_map(|order| Some([order as f64, limit.upper_at(order)?]));
+            let section = limit.section.as_ref().map(|section| format!(" of section {section}")).unwrap_or_default();
+            figure.add_line(format!("limit{section}"), points.collect());
+        }
+    }
+    tables
+}
+
+fn title(root: &Table) -> Result<String, Fault> {
+    let Some(value) = root.get_ref().get("title") else { return Ok("Untitled".to_owned()) };
+    match value.get_ref().as_str() {
+        Some(title) if title.contains('\0') => {
+            Err(Fault::span(value.span(), "the title must not contain NUL, which ends a text in HDF5"))
+        }
+        Some(title) => Ok(title.to_owned()),
+        None => Err(Fault::span(value.span(), "expected the title in quotes")),
+    }
+}
+
 /// What is evaluated of a result, and the limits of it.
 fn evaluate(
     root: &Table,
@@ -336,7 +370,10 @@ fn evaluate(
         evaluate.add_faces(rig);
     }
     for table in limits {
-        let limit = checked::<Limit, _>(&table, |limit| limit.check(&evaluate, &own, rig))?;
+        let limit = checked::<Limit, _>(&table, |limit| {
+            limit.orders.into_iter().for_each(|orders| evaluate.add_amplitudes(orders));
+            limit.check(&evaluate, &own, rig)
+        })?;
         evaluate.add_limit(limit);
     }
     Ok(evaluate)

@@ -23,7 +23,7 @@ use runout_evaluate::{self as values, Evaluate, Evaluated, EvaluatedStation, Gro
 use runout_table::{TableRows, TableSpec};
 use runout_turning::{
     measurement::StationKey,
-    provenance::{Input, Provenance, VERSION},
+    provenance::Input,
     rig::Rig,
     surface::{Surface, SurfaceBuilder},
 };
@@ -372,16 +372,7 @@ impl CompleteFiles {
 
 /// A summary of nothing yet.
 fn begun(pipeline: &Pipeline) -> Summary {
-    Summary {
-        title: pipeline.title.clone(),
-        provenance: Provenance {
-            program: format!("runout {VERSION}"),
-            configuration: pipeline.configuration.clone(),
-            inputs: Vec::new(),
-        },
-        lost_orders: pipeline.assessment.as_ref().map(LostOrders::from).unwrap_or_default(),
-        ..Summary::default()
-    }
+    Summary { lost_orders: pipeline.assessment.as_ref().map(LostOrders::from).unwrap_or_default(), ..pipeline.headed() }
 }
 
 /// What is known without the data: what the layout and the method cannot observe.

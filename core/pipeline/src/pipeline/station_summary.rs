@@ -1,12 +1,12 @@
 //! The summary of one station, from its form, motion and turns.
 
 use super::true_error::true_error;
-use crate::summary::{CaptureSummary, MotionTruth, RejectedTurnSummary, SectionSummary, StationSummary};
+use crate::summary::{CaptureSummary, LevelSummary, MotionTruth, RejectedTurnSummary, SectionSummary, StationSummary};
 use runout_evaluate::EvaluatedStation;
 use runout_turning::{
     azimuth::Azimuth,
     profile::{Profile, Rejection, TurnLength},
-    reading::{sensor_id, setup_id},
+    reading::{coefficients, sensor_id, setup_id, variances},
     rig::Rig,
     separation::{Quantity, SectionAt},
 };
@@ -99,8 +99,21 @@ fn capture_summary(profile: &Profile, rig: Option<&Rig>) -> CaptureSummary {
             })
             .collect(),
         speed_rpm: profile.speed_rpm,
+        levels: profile
+            .sensors
+            .iter()
+            .enumerate()
+            .filter_map(|(channel, index)| level(profile, channel, sensor(*index)))
+            .collect(),
         filters: profile.responses.iter().map(|response| response.description.clone()).collect(),
     }
+}
+
+/// Mean reading of a channel.
+fn level(profile: &Profile, channel: usize, sensor: String) -> Option<LevelSummary> {
+    let mean_um = coefficients(profile, channel).first()?.re;
+    let std_um = variances(profile, channel).and_then(|variances| variances.first().map(|variance| variance.sqrt()));
+    mean_um.is_finite().then_some(LevelSummary { sensor, mean_um, std_um: std_um.filter(|std| std.is_finite()) })
 }
 
 /// Where the radial values of error motion hold: midway between the sensors, not where the tables have x and y.

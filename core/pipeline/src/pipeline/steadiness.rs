@@ -156,6 +156,7 @@ mod tests {
         let setup = |id: &str, part_deg: f64| SetupConfig { id: id.into(), part_deg, ..SetupConfig::default() };
         let config = RigConfig {
             interruptions: Vec::new(),
+            bearings: Vec::new(),
             part_radius_mm: 30.0,
             rotation: Rotation::Ccw,
             sensors: vec![sensor("S1", 0.0), sensor("S2", 90.0)],

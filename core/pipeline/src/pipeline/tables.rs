@@ -39,6 +39,8 @@ const STATION: &str = "name of the axial station";
 const SECTION: &str = "id of the section";
 /// Name of the table of reference circles.
 const CIRCLES: &str = "circles";
+/// Id of the figure of the form's harmonics.
+pub(super) const FORM_HARMONICS: &str = "form-harmonics";
 /// Unit of coefficients, whose rows are of all quantities.
 const MIXED: &str = "um; urad for tilt";
 
@@ -79,7 +81,7 @@ impl StationTables {
             reading: reading(),
             residual: residual(),
             values: values(),
-            turns: turn_tables::specs(),
+            turns: turn_tables::specs(rig.map_or(&[], |rig| &rig.bearings)),
             every: 1,
             taken: 0,
             line,
@@ -327,7 +329,7 @@ fn harmonics() -> TableSpec {
         ],
     )
     .figure(
-        Figure::amplitudes("form-harmonics", "Harmonics of the form", "order", ["re", "im"], Some("std"))
+        Figure::amplitudes(FORM_HARMONICS, "Harmonics of the form", "order", ["re", "im"], Some("std"))
             .panels(["station"])
             .curves(["section"])
             .only("quantity", ["form"]),

@@ -2,7 +2,7 @@
 
 use runout_evaluate::error_motion::{ErrorMotion, Spectrum, TurnsPlot};
 use runout_table::{ArrayRef, ColumnSpec, Figure, Measure, TableSpec, counts, numbers, numbers_or_null, stretches};
-use runout_turning::station::StationResult;
+use runout_turning::{rig::Bearing, station::StationResult};
 
 /// Angles of a polar plot, and orders of a spectrum: more are not visible, and would make a result of many stations large.
 const ANGLES: usize = 360;
@@ -24,9 +24,9 @@ const MOTIONS: [Motion; 2] = [
     Motion { turns: "tilt_turns", spectrum: "tilt_spectrum", unit: "urad", title: "tilt error motion", is_tilt: true },
 ];
 
-/// All of them: polar plots of all turns and spectra, of displacement and of tilt.
-pub(super) fn specs() -> Vec<TableSpec> {
-    MOTIONS.iter().flat_map(|motion| [turns(motion), spectrum(motion)]).collect()
+/// All of them: polar plots of all turns and spectra, of displacement and of tilt; the lines of bearings are named in the spectra.
+pub(super) fn specs(bearings: &[Bearing]) -> Vec<TableSpec> {
+    MOTIONS.iter().flat_map(|motion| [turns(motion), spectrum(motion, bearings)]).collect()
 }
 
 /// Rows of one station, by table; none without a spread over its turns.
@@ -45,7 +45,7 @@ pub(super) fn rows(result: &StationResult) -> Vec<(TableSpec, Vec<ArrayRef>)> {
             tables.push((turns(motion), turns_rows(station, &plots)));
         }
         if !spectra.is_empty() {
-            tables.push((spectrum(motion), spectrum_rows(station, &spectra)));
+            tables.push((spectrum(motion, &[]), spectrum_rows(station, &spectra)));
         }
     }
     tables
@@ -89,7 +89,7 @@ fn turns_rows(station: &str, plots: &[&TurnsPlot]) -> Vec<ArrayRef> {
     ]
 }
 
-fn spectrum(motion: &Motion) -> TableSpec {
+fn spectrum(motion: &Motion, bearings: &[Bearing]) -> TableSpec {
     let Motion { spectrum, unit, title, .. } = motion;
     let column = |name: &str, about: &str| ColumnSpec::number(format!("{name}_{unit}"), *unit, about);
     let columns = vec![
@@ -112,7 +112,13 @@ fn spectrum(motion: &Motion) -> TableSpec {
     let measure = |name: &str| Measure::new(format!("{name}_{unit}")).with_symbol(name);
     let measures = [measure("synchronous"), measure("asynchronous")];
     let id = spectrum.replace('_', "-");
-    let by_order = Figure::bars(id.clone(), format!("Spectrum of {title} by order"), "order", measures.clone());
+    let several = bearings.len() > 1;
+    let named = bearings.iter().flat_map(Bearing::main_lines).map(|line| {
+        let of = if several { format!(" {}", line.bearing) } else { String::new() };
+        (line.order, line.name + &of)
+    });
+    let by_order =
+        Figure::bars(id.clone(), format!("Spectrum of {title} by order"), "order", measures.clone()).named(named);
     let by_hz =
         Figure::lines(format!("{id}-hz"), format!("Spectrum of {title} by frequency"), "frequency_hz", measures);
     let about = format!("amplitudes of {title} by order, up to {ORDERS}/rev");

@@ -1,14 +1,18 @@
 //! The rig: where the sensors look, and how part and sensors stand in each setup.
 
+mod bearing;
 mod calibration;
 mod config;
+mod interruption;
 mod remarks;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+pub use bearing::{Bearing, BearingConfig, BearingLine, Ring, bearing_lines_near};
 pub use calibration::{Calibration, Unit, straightened};
-pub use config::{InterruptionConfig, RigConfig, SensorConfig, SetupConfig};
+pub use config::{RigConfig, SensorConfig, SetupConfig};
+pub use interruption::InterruptionConfig;
 pub use runout_standards::gaps::Gaps;
 
 /// Which way the part turns, seen against +z.
@@ -63,6 +67,8 @@ pub struct Rig {
     pub faces: Vec<Option<f64>>,
     /// Of each section, the declared peak-to-valley bound of its form, in µm; `None` where the form is to be found.
     pub form_bounds_um: Vec<Option<f64>>,
+    /// The spindle's rolling bearings.
+    pub bearings: Vec<Bearing>,
 }
 
 /// A displacement sensor.

@@ -94,6 +94,7 @@ mod tests {
         };
         let config = RigConfig {
             interruptions: Vec::new(),
+            bearings: Vec::new(),
             part_radius_mm,
             rotation: Rotation::Ccw,
             sensors: sensors_deg.iter().enumerate().map(sensor).collect(),

@@ -25,6 +25,7 @@ fn rig() -> Rig {
     };
     let config = RigConfig {
         interruptions: Vec::new(),
+        bearings: Vec::new(),
         part_radius_mm: 30.0,
         rotation: Rotation::Ccw,
         sensors: vec![sensor("S1", 0.0), sensor("S2", 90.0)],

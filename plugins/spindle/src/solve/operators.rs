@@ -189,6 +189,7 @@ mod tests {
             };
             let config = RigConfig {
                 interruptions: Vec::new(),
+                bearings: Vec::new(),
                 part_radius_mm: 30.0,
                 rotation: Rotation::Ccw,
                 sensors: angles_deg.iter().enumerate().map(sensor).collect(),

@@ -28,6 +28,7 @@ pub(crate) fn campaign(seed: u64, effects: &str) -> SpindleConfig {
     let setup = |(id, part_deg): (&str, f64)| SetupConfig { id: id.into(), part_deg, ..SetupConfig::default() };
     let rig = RigConfig {
         interruptions: Vec::new(),
+        bearings: Vec::new(),
         part_radius_mm: 30.0,
         rotation: Rotation::Ccw,
         sensors: vec![

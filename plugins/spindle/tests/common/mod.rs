@@ -31,6 +31,7 @@ pub(crate) fn rig(sensors: &[(f64, f64, &str)], setups: &[(f64, f64)]) -> Rig {
     });
     let config = RigConfig {
         interruptions: Vec::new(),
+        bearings: Vec::new(),
         part_radius_mm: 30.0,
         rotation: Rotation::Ccw,
         sensors: sensors.collect(),

@@ -2,9 +2,11 @@
 //! to date is skipped, one that fails does not stop the others.
 
 mod exports;
+mod names;
 mod overview;
 mod recording;
 mod report;
+mod speed;
 mod trend;
 
 use std::{
@@ -20,6 +22,7 @@ use std::{
 
 pub use recording::{Recording, by_name, recordings};
 pub use report::{BatchReport, Failed, LimitCount, Warned};
+pub use speed::SpeedSeries;
 pub use trend::{RECORDING, Series, Signals, recording_column};
 
 use super::{
@@ -41,7 +44,8 @@ use recording::{of_recording, without_recording};
 use report::Found;
 use runout_error::{Error, ErrorKind, Result};
 use runout_table::{RecordBatch, TableSpec};
-use runout_turning::provenance::{Input, Provenance, VERSION};
+use runout_turning::provenance::{Input, VERSION};
+use speed::Speeds;
 use trend::Trend;
 
 /// The report's file in the folder of the data set.
@@ -117,10 +121,10 @@ enum Computed {
 }
 
 impl Computed {
-    fn publish(self) -> Result<Outcome> {
+    fn publish(self, recording: &str) -> Result<Outcome> {
         match self {
             Self::UpToDate(found) => Ok(Outcome::Skipped(found)),
-            Self::Files(files) => Ok(Outcome::Done(Found::of(&files.publish()?))),
+            Self::Files(files) => Ok(Outcome::Done(Found::of(recording, &files.publish()?))),
         }
     }
 }
@@ -140,9 +144,15 @@ impl<'a> Batch<'a> {
         let pipeline = Pipeline::from_sources(first.as_ref().unwrap_or(sources), registry)?;
         let key = without_recording(&pipeline.configuration);
         let document = Document::parse(sources)?;
-        let exporters =
-            exports::of_batch(document.root(), sources, registry, pipeline.rig.as_ref(), store, &[trend::table()])
-                .map_err(|fault| document.diagnose(fault))?;
+        let exporters = exports::of_batch(
+            document.root(),
+            sources,
+            registry,
+            pipeline.rig.as_ref(),
+            store,
+            &[trend::table(), speed::table()],
+        )
+        .map_err(|fault| document.diagnose(fault))?;
         Ok(Self { sources, registry, store, pipeline, key, exporters })
     }
 
@@ -157,10 +167,10 @@ impl<'a> Batch<'a> {
         let kept: BTreeSet<String> = self.store.recordings()?.into_iter().collect();
         let outcomes = self.work(recordings, &kept, jobs, observer);
         let mut report = BatchReport::begun(&self.pipeline, self.store.folder());
-        let (mut complete, mut given) = (Vec::new(), HashSet::new());
+        let (mut complete, mut speeds, mut given) = (Vec::new(), Vec::new(), HashSet::new());
         for (recording, outcome) in recordings.iter().zip(outcomes) {
             given.insert(recording.name.as_str());
-            let found = match outcome {
+            let mut found = match outcome {
                 Outcome::Done(found) => {
                     report.done += 1;
                     found
@@ -174,13 +184,16 @@ impl<'a> Batch<'a> {
                     continue;
                 }
             };
+            speeds.extend(found.at_speed.take());
             report.count(&recording.name, found);
             complete.push(recording.name.clone());
         }
         for name in kept.into_iter().filter(|name| !given.contains(name.as_str())) {
             match self.summary(&name).filter(|summary| self.is_of_configuration(summary)) {
                 Some(summary) => {
-                    report.count(&name, Found::of(&summary));
+                    let mut found = Found::of(&name, &summary);
+                    speeds.extend(found.at_speed.take());
+                    report.count(&name, found);
                     report.earlier += 1;
                     complete.push(name);
                 }
@@ -189,7 +202,7 @@ impl<'a> Batch<'a> {
         }
         complete.sort_by(|a, b| by_name(a, b));
         report.other_configuration.sort_by(|a, b| by_name(a, b));
-        self.conclude(&complete, report)
+        self.conclude(&complete, Speeds::of(speeds), report)
     }
 
     fn work(
@@ -207,9 +220,10 @@ impl<'a> Batch<'a> {
             Some((index, recordings.get(index)?))
         };
         let publish = |(index, computed): (usize, Result<Computed>)| {
-            let outcome = computed.and_then(Computed::publish).unwrap_or_else(Outcome::Failed);
+            let name = &recordings[index].name;
+            let outcome = computed.and_then(|computed| computed.publish(name)).unwrap_or_else(Outcome::Failed);
             outcomes.lock().unwrap_or_else(PoisonError::into_inner)[index] = Some(outcome);
-            observer.station(&recordings[index].name);
+            observer.station(name);
             Ok(())
         };
         let work = || {
@@ -249,7 +263,7 @@ impl<'a> Batch<'a> {
             // What cannot be read now is not up to date; the run says why.
             && is_of_inputs(&summary, &pipeline).unwrap_or(false)
         {
-            return Ok(Computed::UpToDate(Found::of(&summary)));
+            return Ok(Computed::UpToDate(Found::of(&recording.name, &summary)));
         }
         if is_kept {
             self.store.remove(&recording.name)?;
@@ -274,7 +288,12 @@ impl<'a> Batch<'a> {
     }
 
     /// Writes the values of all recordings and their trend, and the report.
-    fn conclude(&self, complete: &[String], mut report: BatchReport) -> Result<BatchReport> {
+    fn conclude(
+        &self,
+        complete: &[String],
+        mut speeds: Option<Speeds>,
+        mut report: BatchReport,
+    ) -> Result<BatchReport> {
         let mut gathered = Vec::new();
         for table in self.pipeline.tables.iter().filter(|table| tables::holds_values(&table.name)) {
             gathered.push(self.store.gather(table, complete)?);
@@ -291,26 +310,29 @@ impl<'a> Batch<'a> {
             }
         }
         trend.rewind();
-        let spec = trend::table();
-        let info = ResultInfo { title: self.pipeline.title.clone(), tables: vec![spec.clone()], longest_name: None };
+        let (spec, against_speed) = (trend::table(), speed::table());
+        let speed_spec = speeds.as_ref().map(|_| against_speed.clone());
+        let specs = std::iter::once(spec.clone()).chain(speed_spec).collect();
+        let info = ResultInfo { title: self.pipeline.title.clone(), tables: specs, longest_name: None };
         let mut exports = self.exporters.iter().map(|exporter| exporter.begin(&info)).collect::<Result<Vec<_>>>()?;
         for table in &gathered {
             trend.begin_table();
             table.each(&mut |rows| {
+                let at_speed = speeds.as_mut().map(|speeds| speeds.rows(rows)).transpose()?;
                 let rows = trend.rows(rows)?;
-                exports.iter_mut().try_for_each(|export| export.rows(&spec, &rows))
+                exports.iter_mut().try_for_each(|export| {
+                    at_speed.iter().try_for_each(|rows| export.rows(&against_speed, rows))?;
+                    export.rows(&spec, &rows)
+                })
             })?;
         }
+        if let Some(mut speeds) = speeds {
+            let shifts = speeds.shifts(self.pipeline.rig.as_ref())?;
+            exports.iter_mut().try_for_each(|export| export.rows(&against_speed, &shifts))?;
+            report.against_speed = speeds.into_series();
+        }
         report.trend = trend.into_series();
-        let summary = Summary {
-            title: self.pipeline.title.clone(),
-            provenance: Provenance {
-                program: program(),
-                configuration: self.pipeline.configuration.clone(),
-                inputs: Vec::new(),
-            },
-            ..Summary::default()
-        };
+        let summary = self.pipeline.headed();
         let overview = overview::of(&report);
         let completed = Completed {
             summary: &summary,

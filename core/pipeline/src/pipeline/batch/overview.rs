@@ -1,6 +1,6 @@
 //! What a batch found, as a page to look at shows it beside the control charts.
 
-use super::{BatchReport, Series};
+use super::{BatchReport, Series, SpeedSeries};
 use crate::stage::{Overview, Part, Section};
 use runout_table::number::significant;
 
@@ -28,6 +28,7 @@ pub(super) fn of(report: &BatchReport) -> Overview {
         section("Limits, recordings that are proven to keep them or not", limits(report)),
         section("Values with signals for special causes", series(report)),
         section("Signals", signals(report)),
+        section("Error motion against the speed", against_speed(report)),
         section("Recordings that failed", failed(report)),
     ];
     Overview { headline: headline.join(" "), rig: None, sections: sections.into_iter().flatten().collect() }
@@ -81,6 +82,15 @@ fn signals(report: &BatchReport) -> Option<Part> {
         vec![one.recording.clone(), series.series.clone(), tests.join("; ")]
     });
     table(3, &["recording", "value", "rule that is broken"], rows.collect())
+}
+
+fn against_speed(report: &BatchReport) -> Option<Part> {
+    let row = |series: &SpeedSeries| {
+        let at = [series.slowest, series.fastest, series.largest].into_iter().flatten();
+        std::iter::once(series.series.clone()).chain(at.map(|number| significant(number, DIGITS))).collect()
+    };
+    let header = ["value", "lowest rpm", "there", "highest rpm", "there", "largest at rpm", "there"];
+    table(1, &header, report.against_speed.iter().map(row).collect())
 }
 
 fn failed(report: &BatchReport) -> Option<Part> {

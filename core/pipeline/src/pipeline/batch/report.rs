@@ -5,7 +5,11 @@ use std::path::{Path, PathBuf};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::{recording::Recording, trend::Series};
+use super::{
+    recording::Recording,
+    speed::{AtSpeed, SpeedSeries},
+    trend::Series,
+};
 use crate::{
     pipeline::config::Pipeline,
     summary::{Decision, Limit, Summary},
@@ -40,6 +44,9 @@ pub struct BatchReport {
     pub limits: Vec<LimitCount>,
     /// Control charts of all values.
     pub trend: Vec<Series>,
+    /// Error motion and axis shift over the speeds of the recordings; absent where they have one speed.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub against_speed: Vec<SpeedSeries>,
     /// Files of the whole batch.
     pub outputs: Vec<PathBuf>,
 }
@@ -93,11 +100,14 @@ pub(super) struct Found {
     decisions: Vec<Decision>,
     warnings: usize,
     first: Vec<String>,
+    /// Its speed; nothing where that is not known.
+    pub(super) at_speed: Option<AtSpeed>,
 }
 
 impl Found {
-    pub(super) fn of(summary: &Summary) -> Self {
+    pub(super) fn of(recording: &str, summary: &Summary) -> Self {
         Self {
+            at_speed: AtSpeed::of(recording, summary),
             decisions: summary.limits.iter().map(|limit| limit.decision).collect(),
             warnings: summary.findings().count(),
             first: summary.findings().take(MOST_OF_ONE).cloned().collect(),
@@ -133,6 +143,7 @@ impl BatchReport {
             other_configuration: Vec::new(),
             limits: pipeline.evaluate.limits().iter().map(count).collect(),
             trend: Vec::new(),
+            against_speed: Vec::new(),
             outputs: Vec::new(),
         }
     }

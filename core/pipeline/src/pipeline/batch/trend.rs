@@ -6,20 +6,17 @@ use std::collections::HashMap;
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use super::names::{NAMES, columns_of, label, names_at, texts_of};
 use crate::summary::Limit;
 use runout_error::Result;
 use runout_evaluate::ValueId;
 use runout_standards::control_chart::{ControlChart, Signal, Tests};
 use runout_table::{
-    Array, ColumnSpec, Figure, Float64Array, Measure, RecordBatch, StringArray, TableSpec, counts, numbers_or_null,
-    texts,
+    Array, ColumnSpec, Figure, Float64Array, Measure, RecordBatch, TableSpec, counts, numbers_or_null, texts,
 };
 
 /// The column that names the recording of a row.
 pub const RECORDING: &str = "recording";
-/// Columns that distinguish one value from another, in the order in which they are read.
-const NAMES: [&str; 7] = ["symbol", "reference", "filter", "of", "section", "station", "unit"];
-const UNIT: &str = "unit";
 /// The column that says whether a series has a signal, and what it holds then.
 const SIGNAL: (&str, &str) = ("has_signal", "yes");
 /// Signals of a series that are listed; all are in the table.
@@ -235,23 +232,16 @@ impl Trend {
     }
 
     fn each(&mut self, rows: &RecordBatch, mut take: impl FnMut(&mut Self, Row)) {
-        let names =
-            |column: &str| rows.column_by_name(column).and_then(|column| column.as_any().downcast_ref::<StringArray>());
-        let columns = NAMES.map(names);
+        let columns = columns_of(rows);
         let values = rows.column_by_name("value").and_then(|column| column.as_any().downcast_ref::<Float64Array>());
-        let (Some(recordings), Some(values)) = (names(RECORDING), values) else { return };
+        let (Some(recordings), Some(values)) = (texts_of(rows, RECORDING), values) else { return };
         for row in 0..rows.num_rows() {
-            let text = |column: Option<&StringArray>| {
-                column
-                    .filter(|column| column.is_valid(row))
-                    .map_or(String::new(), |column| column.value(row).to_owned())
-            };
             if self.number == 0 || recordings.value(row) != self.recording {
                 recordings.value(row).clone_into(&mut self.recording);
                 self.number += 1;
                 self.seen.clear();
             }
-            let series = self.series_of(&columns.map(text));
+            let series = self.series_of(&names_at(&columns, row));
             let value = if values.is_valid(row) { values.value(row) } else { f64::NAN };
             take(self, Row { series, value });
         }
@@ -263,6 +253,7 @@ impl Trend {
         let there = |text| Some(text).filter(|text: &&str| !text.is_empty());
         let of = there(of).or(there(section));
         let id = ValueId { symbol, reference: there(reference), filter: there(filter), band_upr: [0; 2], of };
+        // The order of an amplitude is not among the names: no limit with orders is of these.
         let named = || self.limits.iter().filter(|limit| limit.names(&id));
         [
             named().filter_map(|limit| limit.lower).reduce(f64::max),
@@ -294,24 +285,6 @@ impl Trend {
         self.known.insert(key, self.series.len() - 1);
         self.series.len() - 1
     }
-}
-
-/// `RONt LSCI, Gaussian 15 UPR, a, s001 / um`.
-///
-/// A value without filter says `none` in its column.
-fn label(names: &[String; NAMES.len()], times: usize) -> String {
-    let mut label = String::new();
-    let said = |(column, name): &(&&str, &String)| !(name.is_empty() || **column == "filter" && *name == "none");
-    for (column, name) in NAMES.iter().zip(names).filter(said) {
-        match *column {
-            "symbol" => {}
-            "reference" => label.push(' '),
-            UNIT => label.push_str(" / "),
-            _ => label.push_str(", "),
-        }
-        label.push_str(name);
-    }
-    if times > 1 { format!("{label} ({times})") } else { label }
 }
 
 #[cfg(test)]

@@ -9,6 +9,7 @@ use crate::{
         document::inline,
         registry::{Catalogue, Plugin, Registry},
     },
+    report_head::ReportHead,
     summary::Limit,
 };
 use runout_evaluate::EvaluateConfig;
@@ -30,7 +31,7 @@ pub struct PlainTable {
 
 /// The tables of a pipeline that name no plugin.
 #[must_use]
-pub fn plain_tables() -> [PlainTable; 5] {
+pub fn plain_tables() -> [PlainTable; 6] {
     let one = |key, about, schema| PlainTable { key, about, repeats: false, schema };
     [
         one("rig", "sensors, setups and part; or the path of a file with these keys", inline::<RigConfig>()),
@@ -38,13 +39,18 @@ pub fn plain_tables() -> [PlainTable; 5] {
         one("evaluate", "which of the standards' values are computed, and how", inline::<EvaluateConfig>()),
         PlainTable { repeats: true, ..one("limit", "a limit of one value", inline::<Limit>()) },
         one("diagnose", "what the closed loop may consider", inline::<DiagnoseConfig>()),
+        one(
+            "report",
+            "machine, operator, instrument, customer and logo, for the head of reports",
+            inline::<ReportHead>(),
+        ),
     ]
 }
 
 /// JSON Schema of a pipeline file with these plugins.
 #[must_use]
 pub fn pipeline_schema(registry: &Registry) -> Value {
-    let [rig, surface, evaluate, limit, diagnose] = plain_tables().map(|table| table.schema);
+    let [rig, surface, evaluate, limit, diagnose, report] = plain_tables().map(|table| table.schema);
     json!({
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "runout pipeline",
@@ -53,6 +59,7 @@ pub fn pipeline_schema(registry: &Registry) -> Value {
         "required": ["load", "separate"],
         "properties": {
             "title": { "type": "string", "description": "For results and meshes." },
+            "report": report,
             "rig": {
                 "description": "Sensors and setups, or the path of a file that has them.",
                 "anyOf": [{ "type": "string" }, rig],

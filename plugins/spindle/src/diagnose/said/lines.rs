@@ -3,6 +3,7 @@
 use runout_core::{
     mains,
     model::diagnosis::{Diagnosis, Estimated},
+    rig::{Bearing, bearing_lines_near},
     stage::Station,
 };
 
@@ -44,6 +45,7 @@ pub(crate) fn say(diagnosis: &mut Diagnosis, shared: &Shared, stations: &[Statio
             }
         }
         remarks.extend(remark(line, &added.targets, rate_of(stations)));
+        remarks.extend(bearing(line, &shared.selection.rig.bearings));
     }
     diagnosis.warnings.extend(remarks);
     diagnosis.warnings.extend(whole_order(diagnosis, stations));
@@ -80,15 +82,40 @@ impl Line {
     }
 }
 
+impl Line {
+    /// What the record resolves of its order: a quarter of a period over all of its turns.
+    fn resolution(&self) -> f64 {
+        (3.0 * self.order_std).max(0.25 / self.turns.max(1.0))
+    }
+
+    /// "21.63 Hz", or "order 2.587" where the speed is not known.
+    fn frequency(&self) -> String {
+        let hertz = self.turns_hz.map(|turns_hz| self.order * turns_hz);
+        hertz.map_or_else(|| format!("order {:.3}", self.order), |hertz| format!("{hertz:.2} Hz"))
+    }
+}
+
+/// Which bearing a motion fits.
+fn bearing(line: &Line, bearings: &[Bearing]) -> Option<String> {
+    let is_motion = matches!(line.source, Source::Motion { .. });
+    let near = bearing_lines_near(bearings, line.order, line.resolution());
+    let names: Vec<String> = near.iter().filter(|_| is_motion).map(ToString::to_string).collect();
+    (!names.is_empty()).then(|| {
+        format!(
+            "the line at {} ({:.3}/rev) fits {} within {:.3}/rev",
+            line.frequency(),
+            line.order,
+            names.join(" and "),
+            line.resolution()
+        )
+    })
+}
+
 /// Whether a line is the mains, and whether all channels may have picked it up.
 fn remark(line: &Line, targets: &[String], rate_hz: Option<f64>) -> Option<String> {
-    let hertz = line.turns_hz.map(|turns_hz| line.order * turns_hz);
-    let mains = line.turns_hz.and_then(|turns_hz| {
-        // What the record resolves: a quarter of a period over all of its turns.
-        let resolution = 0.25 / line.turns.max(1.0);
-        mains::near(line.order * turns_hz, (3.0 * line.order_std).max(resolution) * turns_hz, rate_hz)
-    });
-    let frequency = hertz.map_or_else(|| format!("order {:.3}", line.order), |hertz| format!("{hertz:.2} Hz"));
+    let mains =
+        line.turns_hz.and_then(|turns_hz| mains::near(line.order * turns_hz, line.resolution() * turns_hz, rate_hz));
+    let frequency = line.frequency();
     let is_mains = mains.map(|mains| format!("is {mains}"));
     match (&line.source, is_mains) {
         (Source::Sensors { channels, .. }, mains) => {

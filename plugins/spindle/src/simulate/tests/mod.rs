@@ -31,6 +31,7 @@ fn setup(id: &str, part_deg: f64, sensors_deg: f64) -> SetupConfig {
 fn rig() -> RigConfig {
     RigConfig {
         interruptions: Vec::new(),
+        bearings: Vec::new(),
         part_radius_mm: 30.0,
         rotation: Rotation::Ccw,
         sensors: vec![

@@ -22,6 +22,24 @@ fn an_asynchronous_line_is_found_in_the_turns() {
     }
 }
 
+/// Of two lines, the one at the published order of a bearing's outer ring has its name; the other one fits nothing.
+#[test]
+fn a_line_that_fits_a_bearing_has_its_name() {
+    let effect = r#"[{"plugin":"asynchronous-line","order":ORDER,"amplitude_um":0.3,"direction_deg":30}]"#;
+    let bearing = r#"{"id":"front","rolling_elements":9,"element_diameter_mm":7.94004,"pitch_diameter_mm":39.0398}"#;
+    for (order, name) in [("3.5848", Some("BPFO of bearing front (3.585/rev)")), ("3.27", None)] {
+        let mut config = campaign(5, &effect.replace("ORDER", order));
+        config.rig.bearings = vec![serde_json::from_str(bearing).unwrap()];
+        let (found, _) = diagnosed(&config);
+        assert_eq!(found.diagnosis.added[0].effect, "asynchronous-line");
+        let warnings = &found.diagnosis.warnings;
+        println!("simulated, a line at {order}: {warnings:?}");
+        let said = warnings.iter().find(|warning| warning.contains("of bearing"));
+        assert_eq!(said.is_some(), name.is_some(), "{warnings:?}");
+        assert!(name.is_none_or(|name| said.unwrap().contains(&format!("fits {name} within"))), "{said:?}");
+    }
+}
+
 /// Straight drifts, small to large and of both signs, and one so slow that its time constant stays open: found, sized, taken out of
 /// averages and covariances, so that stated uncertainties of form and motion hold.
 #[test]

@@ -1,0 +1,131 @@
+//! Thermal drift of simulated machines: eight hours of readings once a second.
+
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
+
+use std::f64::consts::TAU;
+
+use rand::{RngExt, SeedableRng, rngs::StdRng};
+use runout_core::{
+    Result,
+    pipeline::{Context, StageConfig},
+    points::{Column, Points},
+    stage::{Outcome, Separator},
+    summary::Value,
+};
+use runout_machine_tests::DriftConfig;
+
+const SECONDS: usize = 8 * 3600;
+
+/// Displacement along Z, X and Y without noise, in µm: a spindle that warms up, and a hall whose temperature swings.
+fn truth(second: f64) -> [f64; 3] {
+    let warming = 1.0 - (-second / 3000.0).exp();
+    let hall = (TAU * second / 28_800.0).sin();
+    [18.0 * warming, 4.0 * warming + 0.3 * hall, -1.5 * hall]
+}
+
+/// Normal enough: twelve uniform numbers.
+fn noise(random: &mut StdRng) -> f64 {
+    (0..12).map(|_| random.random_range(-0.5..0.5)).sum()
+}
+
+fn recorded(seed: u64, noise_um: f64) -> Points {
+    let mut random = StdRng::seed_from_u64(seed);
+    let mut columns = [Vec::new(), Vec::new(), Vec::new()];
+    for second in 0..SECONDS {
+        for (column, value) in columns.iter_mut().zip(truth(second as f64)) {
+            column.push(value + 100.0 + noise_um * noise(&mut random));
+        }
+    }
+    let [z, x, y] = columns;
+    let times = (0..SECONDS).map(|second| second as f64).collect();
+    let temperature = (0..SECONDS).map(|second| 20.0 + (TAU * second as f64 / 28_800.0).sin()).collect();
+    let named = [("time_s", times), ("x_um", x), ("y_um", y), ("z_um", z), ("temperature_c", temperature)];
+    let columns = named.into_iter().map(|(name, values)| Column { name: name.into(), values });
+    Points { columns: columns.collect(), ..Points::default() }
+}
+
+fn separated(text: &str, points: &Points) -> Result<Outcome> {
+    let config: DriftConfig = toml::from_str(text).unwrap();
+    let context = Context { folder: std::path::Path::new("."), rig: None };
+    let Separator::Points(separator) = config.check(&context).unwrap() else { panic!("it takes points") };
+    separator.separate(points)
+}
+
+fn value<'a>(outcome: &'a Outcome, symbol: &str, of: Option<&str>) -> &'a Value {
+    outcome.values.iter().find(|value| value.symbol == symbol && value.of.as_deref() == of).unwrap()
+}
+
+/// Ranges of the truth, of its means over a minute.
+fn true_ranges() -> [f64; 3] {
+    [0, 1, 2].map(|axis| {
+        let mean = |minute: usize| (0..60).map(|second| truth((60 * minute + second) as f64)[axis]).sum::<f64>() / 60.0;
+        let each = (0..SECONDS / 60).map(mean);
+        let (low, high) = each.fold((f64::MAX, f64::MIN), |(low, high), one| (low.min(one), high.max(one)));
+        high - low
+    })
+}
+
+#[test]
+fn intervals_of_the_ranges_hold_the_truth() {
+    let [z, x, y] = true_ranges();
+    let combined = (x * x + y * y + z * z).sqrt();
+    let wanted =
+        [("drift", Some("X"), x), ("drift", Some("Y"), y), ("drift", Some("Z"), z), ("combined-drift", None, combined)];
+    let mut held = [0; 4];
+    for seed in 0..20 {
+        let found = separated("", &recorded(seed, 0.5)).unwrap();
+        for (held, (symbol, of, truth)) in held.iter_mut().zip(wanted) {
+            let value = value(&found, symbol, of);
+            let [low, high] = value.interval_95().unwrap();
+            *held += i32::from((low..=high).contains(&truth));
+            // 0.5 µm in means of a minute are 0.065 µm, whose extremes of 480 are 3.3 of it beyond each end: 0.43 µm of one axis, more of all.
+            assert!((value.value - truth).abs() < 0.6, "{symbol} {of:?}: {value:?} for {truth}");
+        }
+        let temperature = value(&found, "temperature-range", None).value;
+        assert!((temperature - 2.0).abs() < 1e-3, "{temperature}");
+    }
+    println!("simulated: ranges within their 95 % intervals in {held:?} of 20");
+    assert!(held.iter().all(|held| *held >= 17), "{held:?}");
+}
+
+/// Z is within 1 µm of its end from when the truth is; Y swings and does not come to rest.
+#[test]
+fn the_time_to_stability_is_that_of_the_course() {
+    let found = separated("stable_um = 1.0", &recorded(3, 0.3)).unwrap();
+    let last = (9 * SECONDS / 10..SECONDS).map(|second| truth(second as f64)[0]).sum::<f64>() / (SECONDS / 10) as f64;
+    let truth_s = (0..SECONDS).rev().find(|second| (truth(*second as f64)[0] - last).abs() > 1.0).unwrap();
+    let stable = value(&found, "stable-after", Some("Z"));
+    let (minutes, expected) = (stable.value, truth_s as f64 / 60.0);
+    println!("simulated: stable after {minutes:.1} min ± {:?}, truth {expected:.1} min", stable.std());
+    // A window is a minute.
+    assert!((minutes - expected).abs() < 5.0 * stable.std().unwrap().max(0.5), "{minutes} for {expected}");
+    let restless = separated("stable_um = 0.2", &recorded(3, 0.3)).unwrap();
+    assert!(restless.values.iter().all(|value| value.symbol != "stable-after" || value.of.as_deref() != Some("Y")));
+    assert!(restless.remarks.iter().any(|remark| remark.starts_with("Y is not stable")), "{:?}", restless.remarks);
+}
+
+#[test]
+fn what_is_no_test_has_a_reason() {
+    let whole = recorded(1, 0.1);
+    let refused = |points: &Points, said: &str| {
+        let error = separated("", points).unwrap_err();
+        assert!(error.to_string().contains(said) && error.advice().is_some(), "{error}");
+    };
+    let with = |change: &dyn Fn(&mut Column)| {
+        let mut points = whole.clone();
+        points.columns.iter_mut().for_each(change);
+        points
+    };
+    refused(&with(&|column| column.values.truncate(600)), "10 means");
+    refused(
+        &with(&|column| {
+            if column.name == "time_s" {
+                column.values.reverse();
+            }
+        }),
+        "runs back",
+    );
+    let mut bare = whole.clone();
+    bare.columns.retain(|column| !column.name.ends_with("_um"));
+    refused(&bare, "none of x_um");
+}
