@@ -270,6 +270,12 @@ pub(crate) struct PluginsArgs {
     /// A plugin, a table without one (`rig`, `surface`, `evaluate`, `limit`, `diagnose`) or a stage; `stage/name` where two stages
     /// have a plugin of that name (`export/hdf5`).
     pub name: Option<String>,
+    /// With the name `test`: a program that separates turns, with its arguments. Whether it keeps what every separator must.
+    #[arg(last = true, value_name = "COMMAND")]
+    pub command: Vec<String>,
+    /// The rig that `test` gives the program; without it, three sensors around one section.
+    #[arg(long, value_name = "RIG.toml", requires = "command")]
+    pub rig: Option<PathBuf>,
 }
 
 /// `runout schema`.

@@ -24,6 +24,7 @@ pub fn registry() -> Registry {
         runout_spatial_error::register,
         runout_fly_cutting::register,
         runout_as_measured::register,
+        runout_external::register,
         runout_parquet::register,
         runout_gltf::register,
         runout_obj::register,

@@ -36,8 +36,13 @@ pub enum Failure {
     Limit(Vec<String>),
     /// So many warnings, after a result that has been shown with them.
     Warnings(usize),
-    /// So many recordings of a batch failed, after a report that names them.
-    Recordings(usize),
+    /// So many of several things failed (recordings of a batch, checks of a program), after a report that names them.
+    Several {
+        /// How many.
+        failed: usize,
+        /// What each is: "recording".
+        thing: &'static str,
+    },
     /// Standard output cannot be written to.
     Output(io::Error),
     /// The program itself failed: a mistake in it.
@@ -79,13 +84,13 @@ impl Failure {
     pub(crate) fn report(&self, json: bool) -> u8 {
         render::to_stderr(&self.text());
         // The result itself is the one document then.
-        if json && !matches!(self, Self::Limit(_) | Self::Warnings(_) | Self::Recordings(_)) {
+        if json && !matches!(self, Self::Limit(_) | Self::Warnings(_) | Self::Several { .. }) {
             // When stdout cannot be written to either, the exit status is the only report.
             let _ = render::document(&json!({ "error": self.document() }));
         }
         match self {
             Self::CommandLine(_) | Self::Name { .. } | Self::Configuration(_) => 2,
-            Self::Work(_) | Self::Limit(_) | Self::Warnings(_) | Self::Recordings(_) | Self::Output(_) => 1,
+            Self::Work(_) | Self::Limit(_) | Self::Warnings(_) | Self::Several { .. } | Self::Output(_) => 1,
             Self::Program(_) => PROGRAM,
         }
     }
@@ -112,7 +117,7 @@ impl Failure {
             Self::Warnings(count) => {
                 plain(&format!("{}, and --fail-on-warning", render::count(*count, "warning")), None)
             }
-            Self::Recordings(failed) => plain(&format!("{} failed", render::count(*failed, "recording")), None),
+            Self::Several { failed, thing } => plain(&format!("{} failed", render::count(*failed, thing)), None),
             Self::Output(error) => plain(&format!("cannot write to stdout: {error}"), None),
             Self::Program(message) => plain(&format!("the program failed: {message}"), Some(REPORT)),
         }
@@ -150,8 +155,9 @@ impl Failure {
             }
             Self::Limit(open) => json!({ "kind": "limit", "message": "not proven to be kept", "limits": open }),
             Self::Warnings(count) => json!({ "kind": "warnings", "message": "there are warnings", "warnings": count }),
-            Self::Recordings(failed) => {
-                json!({ "kind": "recordings", "message": "recordings failed", "recordings": failed })
+            Self::Several { failed, thing } => {
+                let things = format!("{thing}s");
+                json!({ "kind": things, "message": format!("{things} failed"), things: failed })
             }
             Self::Output(error) => json!({ "kind": ErrorKind::Io.name(), "message": error.to_string() }),
             Self::Program(message) => json!({ "kind": "program", "message": message, "help": REPORT }),

@@ -91,6 +91,7 @@ fn leave_nothing_half() {
     // Where no handler can be set, a later run takes it away.
     let _ = ctrlc::set_handler(|| {
         ENDS.store(true, Ordering::SeqCst);
+        runout_external::end_all();
         let _nothing_is_begun = abandon_all();
         let _ = writeln!(io::stderr(), "\ninterrupted: unfinished output files were removed");
         std::process::exit(INTERRUPTED);

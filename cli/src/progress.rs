@@ -62,4 +62,8 @@ impl Observer for Progress {
     fn station(&self, name: &str) {
         self.advance(name);
     }
+
+    fn message(&self, text: &str) {
+        self.bar.println(one_line(text));
+    }
 }

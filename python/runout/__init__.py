@@ -21,23 +21,24 @@ from .result import Added, Comparison, Diagnosis, Level, Parameter, Plan, Result
 if TYPE_CHECKING:
     from . import checks as checks
     from . import exporters as exporters
+    from . import external as external
     from . import loaders as loaders
     from . import preprocessors as preprocessors
     from . import separators as separators
     from . import tables as tables
 
-_STAGES = ("checks", "exporters", "loaders", "preprocessors", "separators", "tables")
+_MODULES = ("checks", "exporters", "external", "loaders", "preprocessors", "separators", "tables")
 
 
 def __getattr__(name: str) -> Any:
-    """The classes of stages, `runout.loaders` and the like, are imported when they are first used."""
-    if name in _STAGES:
+    """The classes of stages, `runout.loaders` and the like, and `runout.external` are imported when they are first used."""
+    if name in _MODULES:
         return import_module(f"{__name__}.{name}")
     raise AttributeError(f"module `{__name__}` has no attribute `{name}`")
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *_STAGES})
+    return sorted({*globals(), *_MODULES})
 
 
 __all__ = [

@@ -194,3 +194,28 @@ class RotorModel:
 
     supports: Union[Sequence[Mapping[str, Any]], None] = None
     """Places that cannot move."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class External:
+    """Measured points by a program in any language"""
+
+    plugin: ClassVar[str] = "external"
+
+    command: Sequence[str]
+    """The program and its arguments. It runs in the folder of the pipeline; a program whose name has a `/` is a path from there."""
+
+    config: Union[Mapping[str, Any], None] = None
+    """What the program gets as `runout.config`: keys of its own."""
+
+    memory_mb: Union[int, None] = None
+    """Most memory that the program may write to, in MB, on Linux; without it, as much as there is."""
+
+    output_mb: Union[int, None] = None
+    """Largest answer, in MB. Default: 64."""
+
+    path: str
+    """The file that the program reads, relative to the TOML. Its checksum belongs to the result."""
+
+    timeout_s: Union[float, None] = None
+    """Longest time for the answer, in s. Default: 60.0."""

@@ -446,3 +446,32 @@ class AsMeasured:
 
     voids: Union[Union[Literal['mask'], Literal['fill']], None] = None
     """What becomes of points of a height map that have no height, or whose height is left out; without it they are masked."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class External:
+    """A program in any language: tables on stdin and stdout"""
+
+    plugin: ClassVar[str] = "external"
+
+    columns: Union[Sequence[str], None] = None
+    """Columns of numbers that the program takes of measured points; without it, it takes the turns of a rig."""
+
+    command: Sequence[str]
+    """The program and its arguments. It runs in the folder of the pipeline; a program whose name has a `/` is a path from there."""
+
+    config: Union[Mapping[str, Any], None] = None
+    """What the program gets as `runout.config`: keys of its own."""
+
+    labels: Union[Sequence[str], None] = None
+    """Columns of texts that it takes of measured points."""
+
+    memory_mb: Union[int, None] = None
+    """Most memory that the program may write to, in MB, on Linux; without it, as much as there is."""
+
+    output_mb: Union[int, None] = None
+    """Largest answer, in MB. Default: 64."""
+
+    timeout_s: Union[float, None] = None
+    """Longest time for one answer, of a station or of all points, in s; the first one includes the start of the program. Default:
+    60.0."""

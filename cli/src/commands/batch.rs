@@ -34,7 +34,7 @@ pub(crate) fn execute(args: &BatchArgs, json: bool, registry: &Registry) -> Resu
     drop(progress);
     print(&report, json, render::batch::text)?;
     if !report.failed.is_empty() {
-        return Err(Failure::Recordings(report.failed.len()));
+        return Err(Failure::Several { failed: report.failed.len(), thing: "recording" });
     }
     // What is of another configuration is one warning.
     let outdated = usize::from(!report.other_configuration.is_empty());

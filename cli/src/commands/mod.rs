@@ -4,6 +4,7 @@ pub(crate) mod batch;
 pub(crate) mod check;
 pub(crate) mod compare;
 pub(crate) mod completions;
+mod conformance;
 pub(crate) mod convert;
 pub(crate) mod diagnose;
 pub(crate) mod example;

@@ -115,7 +115,7 @@ fn suggested(
     all.iter().map(|found| Suggested::new(found, change(found), rig, before)).collect()
 }
 
-fn rig(sources: &Sources) -> Result<Rig, Failure> {
+pub(super) fn rig(sources: &Sources) -> Result<Rig, Failure> {
     let document = Document::parse(sources)?;
     let root = document.root();
     if root.get_ref().contains_key("rig") {

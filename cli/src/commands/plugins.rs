@@ -8,7 +8,7 @@ use runout_core::{
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
-use super::print;
+use super::{conformance, print};
 use crate::{
     args::PluginsArgs,
     failure::Failure,
@@ -17,6 +17,8 @@ use crate::{
 
 const EFFECT: &str = "effect";
 const TABLE: &str = "table";
+/// The word that asks for a test of a program.
+const TEST: &str = "test";
 
 /// One plugin, or one of the tables that name none.
 #[derive(Debug, Serialize)]
@@ -35,11 +37,23 @@ pub(crate) struct Entry {
     place: String,
 }
 
-/// Lists the plugins, all or those of one stage, or the keys of those with one name.
+/// Lists the plugins, all or those of one stage, or the keys of those with one name; or tests a program.
 ///
 /// # Errors
-/// When the name is unknown.
+/// When the name is unknown, or a check of a program fails.
 pub(crate) fn execute(args: &PluginsArgs, json: bool, registry: &Registry) -> Result<(), Failure> {
+    match (args.name.as_deref() == Some(TEST), &args.command[..]) {
+        (true, [_, ..]) => return conformance::execute(&args.command, args.rig.as_deref(), json),
+        (true, []) => {
+            let help = "runout plugins test -- python3 my_separator.py".to_owned();
+            return Err(Failure::Name { message: "`test` needs the command of a program behind `--`".into(), help });
+        }
+        (false, [word, ..]) => {
+            let help = "only `runout plugins test -- COMMAND` takes a command".to_owned();
+            return Err(Failure::Name { message: format!("unexpected `{word}`"), help });
+        }
+        (false, []) => {}
+    }
     let entries = entries(registry);
     match &args.name {
         None => print(&entries.iter().collect::<Vec<_>>(), json, |entries| list(entries)),

@@ -36,7 +36,9 @@ pub(crate) fn text(report: &Report) -> String {
     if let Some(size) = &report.rig {
         rig(&mut page, size);
     }
-    if let Some(separability) = &report.separability {
+    // A separator that is a program says nothing before a run.
+    let known = report.separability.as_ref().filter(|separability| !separability.orders.is_empty());
+    if let Some(separability) = known {
         orders(&mut page, separability);
         lost_orders(&mut page, separability);
         noise_gain(&mut page, separability);

@@ -228,3 +228,19 @@ fn plan_finds_better_angles_and_writes_the_map() {
     let layouts = 1 + found.len() + report["suggestions"].as_array().unwrap().len();
     assert_eq!(map.lines().count(), 1 + 49 * layouts);
 }
+
+/// A check of a program that fails: a line, and status 1. Without a program there is nothing to test.
+#[test]
+#[cfg(unix)]
+fn a_program_that_fails_a_check_is_named() {
+    let folder = Folder::with(&[]);
+    let ran = folder.run(&["plugins", "test", "--", "sh", "-c", "echo no licence >&2; exit 3"]);
+    assert_eq!(ran.status, 1, "{}", ran.shown());
+    assert!(ran.stdout.starts_with("fails       it answers with harmonics"), "{}", ran.stdout);
+    assert!(ran.stdout.contains("exit status: 3") && ran.stdout.contains("no licence"), "{}", ran.stdout);
+    assert!(ran.stderr.contains("1 check failed"), "{}", ran.stderr);
+    for words in [&["plugins", "test"][..], &["plugins", "hdf5", "--", "sh"]] {
+        let refused = folder.run(words);
+        assert!(refused.status == 2 && refused.stderr.contains("runout plugins test -- "), "{}", refused.shown());
+    }
+}

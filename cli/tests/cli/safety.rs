@@ -128,6 +128,43 @@ fn an_interrupted_program_leaves_nothing() {
     assert!(!out.exists());
 }
 
+/// A separator that is a program ends with the run, and so does what it has started.
+#[test]
+#[cfg(target_os = "linux")]
+fn an_interrupted_run_ends_its_programs() {
+    use std::{
+        process::{Command, Stdio},
+        time::Duration,
+    };
+
+    let program = "plugin = \"external\"\ncommand = [\"sh\", \"-c\", \"sleep 600 & echo $$ $! > pids; wait\"]";
+    let folder = campaign(&pipeline().replace("plugin = \"four-sensor-reversal\"", program));
+    let pids = || fs::read_to_string(folder.path().join("pids")).unwrap_or_default();
+    let mut command = Command::new(assert_cmd::cargo::cargo_bin!("runout"));
+    let command = command.current_dir(folder.path()).args(["run", "pipeline.toml"]);
+    let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    while !pids().ends_with('\n') && child.try_wait().unwrap().is_none() {
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(130), "{}", String::from_utf8_lossy(&output.stderr));
+    let runs = |pid: &str| {
+        let state = fs::read_to_string(format!("/proc/{pid}/stat")).unwrap_or_default();
+        // A process that has ended is a name until somebody asks for its status.
+        !state.is_empty() && !state.contains(") Z ")
+    };
+    for _ in 0..500 {
+        if !pids().split_whitespace().any(runs) {
+            break;
+        }
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    assert_eq!(pids().split_whitespace().count(), 2);
+    assert!(!pids().split_whitespace().any(runs), "{}", pids());
+    assert!(!folder.path().join("out").exists());
+}
+
 /// Every file below a folder, with its contents.
 fn contents(folder: &std::path::Path) -> std::collections::BTreeMap<std::path::PathBuf, Vec<u8>> {
     let mut found = std::collections::BTreeMap::new();

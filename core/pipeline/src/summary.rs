@@ -15,7 +15,12 @@ use serde::{Deserialize, Serialize};
 use runout_closed_loop::{correction::Correction, diagnosis};
 use runout_consistency::{Check, Test, refuted_by};
 use runout_evaluate::own;
-use runout_turning::{provenance::Provenance, reading::ReadingValues, separation::Assessment, surface::Meeting};
+use runout_turning::{
+    provenance::Provenance,
+    reading::ReadingValues,
+    separation::{Assessment, Separation},
+    surface::Meeting,
+};
 
 /// What a run found, for people and programs.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -146,6 +151,25 @@ impl From<diagnosis::LostOrders> for LostOrders {
         let mut take = |name: &str| lost.0.remove(name).unwrap_or_default();
         let (form, motion) = (take("form"), take("motion"));
         Self { form, motion, others: lost.0 }
+    }
+}
+
+impl LostOrders {
+    /// Adds what turned out to be lost at a station: a method may not know it before.
+    pub(crate) fn add_those_of(&mut self, separation: &Separation) {
+        for (unknown, quantity) in separation.unknowns.iter().enumerate() {
+            self.add(quantity.is_form(), &separation.lost_orders(unknown));
+        }
+    }
+
+    /// Adds orders at which a form or a motion turned out to be lost.
+    pub(crate) fn add(&mut self, is_form: bool, orders: &[usize]) {
+        let all = if is_form { &mut self.form } else { &mut self.motion };
+        for order in orders {
+            if let Err(place) = all.binary_search(order) {
+                all.insert(place, *order);
+            }
+        }
     }
 }
 

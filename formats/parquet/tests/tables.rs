@@ -252,21 +252,12 @@ fn values_are_rows_and_null_where_there_is_none() {
     let export = exporter.begin(&StationTables::new(None, None).info("")).unwrap();
     let interval = Uncertainty::new(0.1, [3.7, 4.1], 400);
     let value = |symbol: &str, value, uncertainty| Value {
-        symbol: symbol.into(),
-        unit: "um".into(),
-        value,
-        source: "ISO 12181-1:2011".into(),
         band_upr: [2, 50],
         lost_orders: vec![LOST],
-        weakened_above_upr: None,
-        absent_above_upr: None,
-        no_uncertainty: None,
-        raised_by_noise: None,
-        refuted_by: None,
-        filter: "Gaussian 50 UPR".into(),
-        reference: "MZCI".into(),
+        filter: Some("Gaussian 50 UPR".into()),
         coverage: 0.75,
         uncertainty,
+        ..Value::referred(symbol, value, "um", "ISO 12181-1:2011", "MZCI")
     };
     let mut filled = summary();
     let section = SectionSummary {

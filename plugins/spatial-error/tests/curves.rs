@@ -133,7 +133,7 @@ fn curves_are_those_of_the_axes_within_their_uncertainty() {
         // The mean of ECX turns Y against X, and the line of EZX is that of X.
         for (symbol, truth) in [("EC0Y", -35.0 + of_turn), ("EB0Z", -20.0 + of_line), ("EA0Z", -15.0)] {
             let found = value(&outcome, symbol, None);
-            let std = found.std.unwrap();
+            let std = found.std().unwrap();
             assert!(std < 3.0, "{symbol} ± {std}");
             assert!((found.value - truth).abs() < 4.0 * std, "{symbol}: {found:?}, is {truth}");
         }

@@ -45,7 +45,7 @@ fn the_pipeline_finds_the_hidden_errors() {
     let pipeline = Pipeline::from_sources(&sources, &registry()).unwrap();
     let summary = runout_core::pipeline::run::run(&pipeline, None, &Silent).unwrap();
     for value in &summary.values {
-        println!("{} {:?} {:.3?} ± {:.3?} {}", value.symbol, value.of, value.value, value.std, value.unit);
+        println!("{} {:?} {:.3?} ± {:.3?} {}", value.symbol, value.of, value.value, value.std(), value.unit);
     }
     for warning in &summary.warnings {
         println!("- {warning}");

@@ -55,7 +55,8 @@ fn agree<M: Method>(name: &str, sensors: &[(f64, f64, &str)], setups: &[(f64, f6
                 (assessment.lost_form_orders(), assessment.lost_motion_orders())
             };
             assert_eq!(lost(&closed), lost(&general), "{name}");
-            let sensitivities = [closed.sensitivity(&station).unwrap(), general.sensitivity(&station).unwrap()];
+            let sensitivities =
+                [closed.sensitivity(&station).unwrap().unwrap(), general.sensitivity(&station).unwrap().unwrap()];
             let (closed, general) = (closed.separate(&station).unwrap(), general.separate(&station).unwrap());
             assert_eq!(closed.observable, general.observable, "{name}");
             assert!(

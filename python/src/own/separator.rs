@@ -237,16 +237,16 @@ impl StationSeparator for OwnSeparator {
         Ok(separation)
     }
 
-    fn sensitivity(&self, station: &Station) -> Result<Sensitivity> {
+    fn sensitivity(&self, station: &Station) -> Result<Option<Sensitivity>> {
         let found = self.found("compare", station)?;
-        let mut sensitivity = self.solving.sensitivity(station)?;
+        let Some(mut sensitivity) = self.solving.sensitivity(station)? else { return Ok(None) };
         let width = self.formula.layout.unknowns.len();
         for (index, row) in sensitivity.operator.chunks_mut(sensitivity.readings).enumerate() {
             if !found.gives(index / width, index % width) {
                 row.fill(Complex64::ZERO);
             }
         }
-        Ok(sensitivity)
+        Ok(Some(sensitivity))
     }
 
     fn projection(&self, setup: usize) -> Option<Projection> {

@@ -6,6 +6,8 @@ pub trait Observer: Sync {
     fn begin(&self, _stations: usize) {}
     /// A station is done.
     fn station(&self, _name: &str) {}
+    /// A stage says something.
+    fn message(&self, _text: &str) {}
 }
 
 /// Watches nothing.

@@ -56,7 +56,6 @@ pub(super) struct ResultWriter {
     evaluate: Evaluate,
     /// Whether the sections' centres and mean radii are known.
     placed: bool,
-    /// Whether the part's surface is interrupted somewhere.
     interrupted: bool,
     /// Signs and references of a domain's own tables.
     convention: String,
@@ -136,6 +135,7 @@ impl ResultWriter {
         if let Some(sections) = &mut self.sections {
             sections.add(result);
         }
+        rig.iter().for_each(|_| self.summary.lost_orders.add_those_of(&result.separation));
         self.summary.stations.push(summarise(station, rig));
         let checks = &result.separation.residual.checks;
         self.summary.consistency.extend(checks.iter().map(|check| check.clone().within(&result.station)));

@@ -110,6 +110,7 @@ fn run_turns(
     let (radius_mm, stations) = (rig.part_radius_mm, recording.stations().len());
     let work = |index, station: Station| {
         let separation = separate(separator, &station, rig)?;
+        separator.messages().iter().for_each(|text| observer.message(text));
         let angles = station.profiles.first().map_or(0, |profile| profile.samples_per_rev);
         let truth = recording.truth(index)?;
         let Station { name: station, z_mm, profiles, .. } = station;

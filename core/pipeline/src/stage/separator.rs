@@ -33,11 +33,16 @@ pub trait StationSeparator: Send + Sync {
     /// When the profiles do not fit the rig.
     fn separate(&self, station: &Station) -> Result<Separation>;
 
-    /// How its estimates follow from the readings of one station.
+    /// How its estimates follow from the readings of one station; `None` where that is not known.
     ///
     /// # Errors
     /// When the profiles do not fit the rig.
-    fn sensitivity(&self, station: &Station) -> Result<Sensitivity>;
+    fn sensitivity(&self, station: &Station) -> Result<Option<Sensitivity>>;
+
+    /// What it has to say to who watches the run, since it was last asked.
+    fn messages(&self) -> Vec<String> {
+        Vec::new()
+    }
 
     /// How motion of the axis follows from the readings of one setup (an index into the rig's); `None` where they show none.
     fn projection(&self, _setup: usize) -> Option<Projection> {

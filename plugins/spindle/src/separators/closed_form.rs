@@ -190,8 +190,8 @@ impl StationSeparator for ClosedFormSeparator {
         separate(&self.solver(), station, |readings| self.operators(readings))
     }
 
-    fn sensitivity(&self, station: &Station) -> Result<Sensitivity> {
-        self.solver().sensitivity(station, |readings| self.operators(readings))
+    fn sensitivity(&self, station: &Station) -> Result<Option<Sensitivity>> {
+        self.solver().sensitivity(station, |readings| self.operators(readings)).map(Some)
     }
 
     fn projection(&self, setup: usize) -> Option<Projection> {

@@ -116,8 +116,8 @@ impl StationSeparator for HarmonicLeastSquares {
         separate(&self.solver(), station, |readings| operators(&self.layout, readings, self.weighting))
     }
 
-    fn sensitivity(&self, station: &Station) -> Result<Sensitivity> {
-        self.solver().sensitivity(station, |readings| operators(&self.layout, readings, self.weighting))
+    fn sensitivity(&self, station: &Station) -> Result<Option<Sensitivity>> {
+        self.solver().sensitivity(station, |readings| operators(&self.layout, readings, self.weighting)).map(Some)
     }
 
     fn projection(&self, setup: usize) -> Option<Projection> {

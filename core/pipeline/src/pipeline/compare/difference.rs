@@ -153,9 +153,11 @@ fn compared(quantity: Quantity, pair: [&Estimates; 2], unknowns: [usize; 2], sca
             by_order.e_n.push(None);
             continue;
         };
-        let rows = [pair[0].row(order, unknowns[0]), pair[1].row(order, unknowns[1])];
-        let between: Vec<Complex64> = rows[1].iter().zip(rows[0]).map(|(b, a)| b - a).collect();
-        let variance = scatter.variance(order, &between);
+        let rows = pair[0].row(order, unknowns[0]).zip(pair[1].row(order, unknowns[1]));
+        let variance = rows.map_or(f64::NAN, |(a, b)| {
+            let between: Vec<Complex64> = b.iter().zip(a).map(|(b, a)| b - a).collect();
+            scatter.variance(order, &between)
+        });
         let distance = (b - a).norm();
         let e_n = normalised(distance, variance.sqrt(), variance_a.max(variance_b).sqrt(), size);
         orders_compared += 1;

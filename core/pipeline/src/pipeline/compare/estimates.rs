@@ -61,11 +61,12 @@ pub(super) struct Estimates {
     values: Vec<Complex64>,
     variance: Vec<f64>,
     observable: Vec<bool>,
-    sensitivity: Sensitivity,
+    /// Nothing where it is not known.
+    sensitivity: Option<Sensitivity>,
 }
 
 impl Estimates {
-    pub(crate) fn new(separation: &Separation, sensitivity: Sensitivity) -> Self {
+    pub(crate) fn new(separation: &Separation, sensitivity: Option<Sensitivity>) -> Self {
         Self {
             unknowns: separation.unknowns.clone(),
             motion_z_mm: separation.motion_z_mm,
@@ -90,9 +91,11 @@ impl Estimates {
         (*self.observable.get(index)?).then(|| (self.values[index], self.variance[index]))
     }
 
-    pub(crate) fn row(&self, order: usize, unknown: usize) -> &[Complex64] {
-        let start = (order * self.unknowns.len() + unknown) * self.sensitivity.readings;
-        &self.sensitivity.operator[start..start + self.sensitivity.readings]
+    /// How an estimate follows from the readings, where that is known.
+    pub(crate) fn row(&self, order: usize, unknown: usize) -> Option<&[Complex64]> {
+        let Sensitivity { readings, operator } = self.sensitivity.as_ref()?;
+        let start = (order * self.unknowns.len() + unknown) * readings;
+        operator.get(start..start + readings)
     }
 
     pub(crate) fn has_motion(&self) -> bool {
@@ -118,7 +121,7 @@ impl Estimates {
         }
         let distance = (z_mm - self.motion_z_mm) * UM_PER_MM_URAD;
         let mut moved = Self { motion_z_mm: z_mm, ..self.clone() };
-        let (width, readings) = (self.unknowns.len(), self.sensitivity.readings);
+        let width = self.unknowns.len();
         for (shift, quantity) in self.unknowns.iter().enumerate() {
             let Some((tilt, factor)) = quantity.moved_by_tilt() else { continue };
             let (tilt, lever) = (self.position(tilt), factor * distance);
@@ -130,9 +133,12 @@ impl Estimates {
                     continue;
                 };
                 moved.values[index] += value * lever;
-                let own = &mut moved.sensitivity.operator[index * readings..(index + 1) * readings];
-                own.iter_mut().zip(row).for_each(|(entry, tilt)| *entry += tilt * lever);
-                moved.variance[index] = scatter.variance(order, own);
+                moved.variance[index] = f64::NAN;
+                if let (Some(Sensitivity { readings, operator }), Some(row)) = (&mut moved.sensitivity, row) {
+                    let own = &mut operator[index * *readings..(index + 1) * *readings];
+                    own.iter_mut().zip(row).for_each(|(entry, tilt)| *entry += tilt * lever);
+                    moved.variance[index] = scatter.variance(order, own);
+                }
             }
         }
         Some(moved)

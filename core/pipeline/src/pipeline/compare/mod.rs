@@ -132,12 +132,7 @@ impl<'a> Comparing<'a> {
             puts_right: None,
             alone: false,
         };
-        let work = |index, station: Station| self.station(&station, recording.truth(index)?.as_ref());
-        let mut warnings = recording.remarks();
-        let inputs = line.run(threads, observer, work, |station: StationComparison| {
-            warnings.extend(of_station(&station.station, &station.warnings));
-            take(station)
-        })?;
+        let work = |index, station: Station| self.station(&station, recording.truth(index)?.as_ref(), observer);
         let own = pipeline.assessment.as_ref();
         let assessments = own.into_iter().chain(self.methods.iter().map(|method| &method.assessment));
         let methods = self.names.iter().zip(assessments).map(|(name, found)| MethodSummary {
@@ -146,6 +141,20 @@ impl<'a> Comparing<'a> {
             lost_orders: LostOrders::from(found),
             notes: found.notes.clone(),
         });
+        let mut methods: Vec<MethodSummary> = methods.collect();
+        let mut warnings = recording.remarks();
+        let inputs = line.run(threads, observer, work, |station: StationComparison| {
+            warnings.extend(of_station(&station.station, &station.warnings));
+            for quantity in &station.quantities {
+                for value in &quantity.values {
+                    let method = methods.iter_mut().find(|method| method.method == value.method);
+                    method.into_iter().for_each(|method| {
+                        method.lost_orders.add(quantity.section.is_some(), &value.lost_orders);
+                    });
+                }
+            }
+            take(station)
+        })?;
         Ok(Comparison {
             title: pipeline.title.clone(),
             provenance: Provenance {
@@ -154,7 +163,7 @@ impl<'a> Comparing<'a> {
                 inputs,
             },
             reference: pipeline.separator.clone(),
-            methods: methods.collect(),
+            methods,
             refused: self.refused.clone(),
             stations: Vec::new(),
             values: Vec::new(),
@@ -164,7 +173,12 @@ impl<'a> Comparing<'a> {
         })
     }
 
-    fn station(&self, station: &Station, truth: Option<&StationTruth>) -> Result<StationComparison> {
+    fn station(
+        &self,
+        station: &Station,
+        truth: Option<&StationTruth>,
+        observer: &dyn Observer,
+    ) -> Result<StationComparison> {
         let scatter = Scatter::of(station);
         let separators = std::iter::once(self.reference).chain(self.methods.iter().map(|method| &*method.separator));
         let angles = station.profiles.first().map_or(0, |profile| profile.samples_per_rev);
@@ -175,6 +189,7 @@ impl<'a> Comparing<'a> {
             station.profiles.iter().flat_map(|profile| profile.warnings.iter().cloned()).collect();
         for (separator, name) in separators.zip(&self.names) {
             let separation = separate(separator, station, self.rig)?;
+            separator.messages().iter().for_each(|text| observer.message(text));
             warnings.extend(separation.warnings.iter().map(|warning| format!("{name}: {warning}")));
             estimates.push(Estimates::new(&separation, separator.sensitivity(station)?));
             // Profiles are shared; the standards' values need none.

@@ -1,0 +1,9 @@
+//! Tests of this crate, in one program.
+#![allow(clippy::unwrap_used, reason = "tests")]
+
+mod conformance;
+mod hostile;
+mod loader;
+mod points;
+mod support;
+mod three_point;
