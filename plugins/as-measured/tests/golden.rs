@@ -28,7 +28,7 @@ fn of_file(file: &str, separate: &str, evaluate: &str) -> Summary {
 
 fn value(summary: &Summary, symbol: &str) -> f64 {
     let found = summary.values.iter().find(|value| value.symbol == symbol);
-    found.map(|value| value.value).unwrap_or_else(|| panic!("no {symbol} in {:?}", summary.values))
+    found.unwrap_or_else(|| panic!("no {symbol} in {:?}", summary.values)).value
 }
 
 fn expected() -> Value {

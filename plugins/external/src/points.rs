@@ -13,7 +13,7 @@ use runout_core::{
     summary::Value,
     table::{ArrayRef, ColumnSpec, Figure, Measure, TableRows, TableSpec, counts, numbers, numbers_or_null, texts},
 };
-use serde_json::Value;
+use serde_json::Value as Json;
 
 use crate::{
     answer::Answer,
@@ -30,7 +30,7 @@ const UNITS: [&str; 8] = ["mm", "um", "nm", "deg", "rad", "urad", "s", "m"];
 /// A program for measured points.
 pub(crate) struct ProgramForPoints {
     session: Session,
-    config: Value,
+    config: Json,
     columns: Vec<PointColumn>,
 }
 
@@ -41,7 +41,7 @@ impl ProgramForPoints {
     /// When there are no numbers, or a name is there twice.
     pub(crate) fn new(
         session: Session,
-        config: Value,
+        config: Json,
         numbers: &[String],
         labels: &[String],
     ) -> std::result::Result<Self, Fault> {

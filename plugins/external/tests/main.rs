@@ -1,5 +1,5 @@
 //! Tests of this crate, in one program.
-#![allow(clippy::unwrap_used, reason = "tests")]
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
 mod conformance;
 mod hostile;
