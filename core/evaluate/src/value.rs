@@ -142,6 +142,15 @@ impl Value {
         Self { is_key: true, ..self }
     }
 
+    /// The same of an amplitude, a range or a root mean square, none of which is below 0: nor is its interval.
+    #[must_use]
+    pub fn not_negative(mut self) -> Self {
+        if let Some(known) = &mut self.uncertainty {
+            known.interval_95 = known.interval_95.map(|end| end.max(0.0));
+        }
+        self
+    }
+
     /// The same, refuted by what its own data say.
     #[must_use]
     pub fn refuted_by(self, by: Option<String>) -> Self {

@@ -7,6 +7,7 @@ use std::{collections::BTreeMap, env, fs, path::Path, process::Command};
 use calamine::{Data, Reader, Xlsx};
 use runout_core::{
     atomic_file::commit_all,
+    draws::NORMAL_95,
     evaluate::decide,
     fault::Fault,
     pipeline::{Context, Registry},
@@ -99,7 +100,10 @@ fn expected() -> BTreeMap<String, Row> {
         ("s1 a RONt".into(), row("conforms", [Some(1.5), Some(0.125), Some(1.25), Some(1.75), limit])),
         ("s1 b RONt".into(), row("undecided", [Some(2.0625), Some(0.125), Some(1.8125), Some(2.3125), limit])),
         ("s2 a RONt".into(), row("undecided", [Some(9.0), None, None, None, limit])),
-        (" probe; left gain".into(), row("", [Some(1.25), Some(0.5), None, None, None])),
+        (
+            " probe; left gain".into(),
+            row("", [Some(1.25), Some(0.5), Some(1.25 - NORMAL_95 * 0.5), Some(1.25 + NORMAL_95 * 0.5), None]),
+        ),
         ("  offset".into(), row("", [None; 5])),
     ])
 }

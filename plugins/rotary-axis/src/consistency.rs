@@ -185,7 +185,8 @@ pub(crate) fn closing_errors(campaign: &Campaign, std_um: f64) -> Vec<Value> {
         let mean = own.iter().map(|(_, difference)| difference).sum::<Vector3<f64>>() / count;
         let about = "distance between the ball's places at the end and the beginning of a turn";
         let std = std_um * (2.0 / count).sqrt();
-        (!own.is_empty()).then(|| Value::new("closing_error", 1e3 * mean.norm(), std, "um", about).of(id))
+        (!own.is_empty())
+            .then(|| Value::new("closing_error", 1e3 * mean.norm(), std, "um", about).not_negative().of(id))
     };
     campaign.balls.iter().enumerate().filter_map(of_ball).collect()
 }

@@ -73,7 +73,7 @@ impl Conclusion<'_> {
         let covariance = field.map(|field| &solution.covariances[field]);
         let mut values = Vec::new();
         let mut add = |symbol: &str, number: f64, std: f64, unit: &str, about: &str| {
-            values.push(Value::new(symbol, number, std, unit, about).of(COMPONENTS[axis]));
+            values.push(Value::new(symbol, number, std, unit, about).of(COMPONENTS[axis]).not_negative());
         };
         let sill = covariance.map_or(f64::NAN, |covariance| covariance.sill_um);
         add("sill", sill, sill * relative_std(0), "um", "standard deviation of the field");
@@ -162,7 +162,8 @@ pub(crate) fn of_curves(found: &ComponentFit) -> Vec<Value> {
             "of these what no axis can take away: no chain of rigid bodies has this error",
         ),
     ];
-    let volumetric =
-        volumetric.into_iter().map(|(symbol, [value, std], about)| Value::new(symbol, value, std, "um", about).key());
+    let volumetric = volumetric
+        .into_iter()
+        .map(|(symbol, [value, std], about)| Value::new(symbol, value, std, "um", about).not_negative().key());
     of_location.chain(volumetric).collect()
 }

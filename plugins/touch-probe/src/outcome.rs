@@ -158,20 +158,15 @@ impl Found<'_> {
         ];
         for (symbol, range, about) in of_ranges {
             let about = format!("range, mean over passes: {about}");
-            values.push(Value::new(symbol, range.um, range.std_um, "um", &about).key());
+            values.push(Value::new(symbol, range.um, range.std_um, "um", &about).not_negative().key());
         }
         for lobe in lobes {
             let of = |number: f64| if lobe.observable { number } else { f64::NAN };
             let [along, across] = lobe.std_um();
             let order = lobe.order;
             let about = format!("amplitude of lobing of order {order}");
-            values.push(Value::new(
-                &format!("lobe_{order}_amplitude"),
-                of(lobe.amplitude_um()),
-                of(along),
-                "um",
-                &about,
-            ));
+            let symbol = format!("lobe_{order}_amplitude");
+            values.push(Value::new(&symbol, of(lobe.amplitude_um()), of(along), "um", &about).not_negative());
             let about = format!(
                 "phase of lobing of order {order}: A cos({order} direction + phase), probe's frame; null without \
                                  evidence of the order"
@@ -212,7 +207,7 @@ impl Found<'_> {
                 (noise, noise / (2.0 * self.fit.solved.dof as f64).sqrt())
             }
         };
-        values.push(Value::new("touch_std", noise, std, "um", &about));
+        values.push(Value::new("touch_std", noise, std, "um", &about).not_negative());
         values
     }
 
