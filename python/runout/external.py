@@ -183,7 +183,7 @@ def harmonics(station: Station, values: Harmonics, std: Harmonics) -> pa.Table:
 
 
 def _complex(table: pa.Table) -> npt.NDArray[np.complex128]:
-    return table["re"].to_numpy() + 1j * table["im"].to_numpy()
+    return np.asarray(table["re"].to_numpy() + 1j * table["im"].to_numpy(), dtype=np.complex128)
 
 
 def _about(table: pa.Table) -> dict[str, str]:
