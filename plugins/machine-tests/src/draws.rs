@@ -15,6 +15,10 @@ const DRAWS: usize = 200;
 pub(crate) struct Draw(ChaCha8Rng);
 
 impl Draw {
+    pub(crate) fn new(seed: u64) -> Self {
+        Self(ChaCha8Rng::seed_from_u64(seed))
+    }
+
     pub(crate) fn normal(&mut self) -> f64 {
         StandardNormal.sample(&mut self.0)
     }
@@ -61,7 +65,7 @@ pub(crate) fn with_uncertainty(
     seed: u64,
     error: impl Fn(Machine, &mut Draw) -> Vec<f64>,
 ) -> Vec<Value> {
-    let mut draw = Draw(ChaCha8Rng::seed_from_u64(seed));
+    let mut draw = Draw::new(seed);
     let errors = [Machine::Least, Machine::Most]
         .map(|machine| (0..DRAWS).map(|_| error(machine, &mut draw)).collect::<Vec<Vec<f64>>>());
     let with = |(index, computed): (usize, &Computed)| {

@@ -7,12 +7,19 @@
 //! | `stable-after` | time from which on an axis stays within `stable_um` of where it is in the last tenth of the test |
 //!
 //! Range and combination are those of a maker of spindle analysers (Lion Precision, *SpindleCheck*, manual M017-7500.004, page 29, which names
-//! ISO 230-3); the criterion of stability is this program's. Displacements are means over `window_s`. Their noise is what second differences of
-//! neighbouring means show, which a slow drift has not.
+//! ISO 230-3); the criterion of stability is this program's. Displacements are means over `window_s`. Their noise is what most second differences
+//! of neighbouring means show, which a slow drift has not, nor a few steps.
+//!
+//! # The interval of a range
+//!
+//! Noise σ ε of independent means can only raise a range on the whole: between the windows in which the axis is truly farthest out the reading differs
+//! from the true range R by σ (ε − ε′), and the range found, R̂, is not below it; so R ≤ R̂ − σ (ε − ε′). And R̂ is at most R and the largest ε of
+//! the windows that may be farthest out on each side; so R ≥ R̂ − σ (max ε + max ε′). The interval is from the 2.5 % quantile of the latter to the
+//! 97.5 % quantile of the former. It holds for every course.
 
 use runout_core::{
     Error, ErrorKind, Result,
-    draws::seed,
+    draws::{NORMAL_95, Uncertainty, seed},
     fault::Fault,
     pipeline::{Context, StageConfig},
     points::{PointColumn, PointKind::Number, Points},
@@ -23,7 +30,7 @@ use runout_core::{
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::draws::{Computed, Draw, Machine, with_uncertainty};
+use crate::draws::Draw;
 
 /// Means that a test has at least: fewer show neither their noise nor a course.
 const FEWEST_MEANS: usize = 20;
@@ -33,10 +40,18 @@ const END: f64 = 0.1;
 const STABLE: f64 = 0.1;
 /// Means on each side of one that stability is looked at over.
 const BESIDE: usize = 2;
-/// Share of the test on each side of a mean that a course without noise is a mean over: what noise raises a range by is largest there.
-const WIDE: f64 = 0.025;
 /// What a mean of second differences has of the variance of single means: 1 + 1/4 + 1/4.
 const OF_SECOND_DIFFERENCES: f64 = 1.5;
+/// Median of the distance of normal numbers from 0, in standard deviations.
+const NORMAL_MEDIAN: f64 = 0.674_489_75;
+/// Windows so many standard deviations of a mean below the farthest one are not farther out: noise does that to one in 1e6 pairs.
+const REACH: f64 = 7.0;
+/// Draws of the noise.
+const DRAWS: usize = 1000;
+/// Standard deviations of a smoothed mean by which noise moves a band in or out at most.
+const AT_MOST: f64 = 3.0;
+/// Windows with less than this share of the readings of most are left out.
+const FILLED: f64 = 0.5;
 
 /// `[separate] plugin = "drift"`.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
@@ -97,11 +112,13 @@ impl PointSeparator for Drift {
 
     fn separate(&self, points: &Points) -> Result<Outcome> {
         let test = Test::of(points, self.0.window_s)?;
-        let mut remarks = Vec::new();
+        let mut remarks: Vec<String> = test.gap().into_iter().collect();
         let mut values = self.values(&test, &mut remarks);
         if let Some(temperatures) = &test.temperatures {
             let about = "range of the temperature over the test, as recorded";
-            values.push(Value::new("temperature-range", range(temperatures), f64::NAN, "K", about));
+            let no_uncertainty = Some("nothing shows the error of the thermometer".to_owned());
+            let value = Value::new("temperature-range", range(temperatures), f64::NAN, "K", about);
+            values.push(Value { no_uncertainty, ..value });
         }
         let end_min = test.times_min.last().copied().unwrap_or_default();
         let notes = vec![format!(
@@ -128,31 +145,27 @@ impl PointSeparator for Drift {
 impl Drift {
     fn values(&self, test: &Test, remarks: &mut Vec<String>) -> Vec<Value> {
         let names: Vec<&str> = test.axes.iter().map(|axis| axis.name).collect();
-        let seed = seed(&["drift", &names.join("")]);
-        let ranges = |courses: &[Vec<f64>]| -> Vec<f64> {
-            let mut ranges: Vec<f64> = courses.iter().map(|course| range(course)).collect();
-            ranges.push(ranges.iter().map(|range| range * range).sum::<f64>().sqrt());
-            ranges
+        let found = with_combined(test.axes.iter().map(|axis| range(&axis.means)).collect());
+        let mut draw = Draw::new(seed(&["drift", &names.join("")]));
+        let mut drawn = |of: fn(&Axis, &mut Draw) -> f64| -> Vec<Vec<f64>> {
+            let mut one = || with_combined(test.axes.iter().map(|axis| of(axis, &mut draw)).collect());
+            (0..DRAWS).map(|_| one()).collect()
         };
-        let found = test.courses(Machine::Most);
-        let computed = |(index, value): (usize, f64)| {
-            let is_axis = index < names.len();
-            let (symbol, about) = if is_axis {
-                ("drift", "range of the displacement over the test (ISO 230-3)")
-            } else {
-                ("combined-drift", "root of the sum of the squares of the axes' ranges")
+        let (lows, highs) = (drawn(Axis::least), drawn(Axis::most));
+        let mut values: Vec<Value> = Vec::new();
+        for (index, value) in found.into_iter().enumerate() {
+            let [low, high] = [(&lows, 0.025), (&highs, 0.975)].map(|(draws, share)| {
+                let mut ends: Vec<f64> = draws.iter().map(|draw| draw[index]).collect();
+                ends.sort_by(f64::total_cmp);
+                ends[(share * (DRAWS - 1) as f64).round() as usize]
+            });
+            let (symbol, about) = match names.get(index) {
+                Some(_) => ("drift", "range of the displacement over the test (ISO 230-3)"),
+                None => ("combined-drift", "root of the sum of the squares of the axes' ranges"),
             };
-            Computed { symbol: symbol.into(), value, about, is_key: true, least: 0.0 }
-        };
-        let all: Vec<Computed> = ranges(&found).into_iter().enumerate().map(computed).collect();
-        let error = |machine: Machine, draw: &mut Draw| {
-            let of_machine = test.courses(machine);
-            let again = test.again(&of_machine, draw);
-            ranges(&again).iter().zip(ranges(&of_machine)).map(|(again, truth)| again - truth).collect()
-        };
-        let mut values: Vec<Value> = with_uncertainty(&all, "um", seed, error);
-        for (value, name) in values.iter_mut().zip(&names) {
-            value.of = Some((*name).to_owned());
+            let uncertainty = Some(of_interval([low, high], DRAWS));
+            let of = names.get(index).map(|name| (*name).to_owned());
+            values.push(Value { of, uncertainty, ..Value::new(symbol, value, f64::NAN, "um", about) }.key());
         }
         for axis in &test.axes {
             values.extend(self.stability(test, axis, remarks));
@@ -160,7 +173,8 @@ impl Drift {
         values
     }
 
-    /// From when on an axis is stable; nothing where it is not.
+    /// From when on an axis is stable; nothing where it is not. Noise moves the band by [`AT_MOST`] of its standard deviations at most, and
+    /// smoothing moves a step by its windows.
     fn stability(&self, test: &Test, axis: &Axis, remarks: &mut Vec<String>) -> Option<Value> {
         let band_um = self.0.stable_um.unwrap_or(STABLE * range(&axis.smooth));
         let Some(after) = stable_after(&axis.smooth, band_um) else {
@@ -170,21 +184,29 @@ impl Drift {
             ));
             return None;
         };
-        let minutes = |place: usize| test.times_min[place] - test.times_min[0];
+        let last = test.times_min.len() - 1;
+        let minutes = |place: usize| test.times_min[place.min(last)] - test.times_min[0];
+        let noise_um = AT_MOST * axis.noise_um / ((2 * BESIDE + 1) as f64).sqrt();
+        let at = |band_um: f64| stable_after(&axis.smooth, band_um);
+        let earliest = at(band_um + noise_um).unwrap_or(after).saturating_sub(BESIDE + 1);
+        let latest = at(band_um - noise_um).unwrap_or(last) + 1;
         let about =
             "time from which on the axis stays within the band about its last position (criterion of this program)";
-        let computed =
-            Computed { symbol: "stable-after".into(), value: minutes(after), about, is_key: false, least: 0.0 };
-        let error = |machine: Machine, draw: &mut Draw| {
-            // The smoothed course is the axis; what is measured again is smoothed again.
-            let course = if machine == Machine::Most { &axis.smooth } else { &axis.course };
-            let again: Vec<f64> = course.iter().map(|one| one + axis.noise_um * draw.normal()).collect();
-            let at = |course: &[f64]| minutes(stable_after(course, band_um).unwrap_or(course.len() - 1));
-            vec![at(&smoothed(&again, BESIDE)) - at(course)]
-        };
-        let mut values = with_uncertainty(&[computed], "min", seed(&["stable", axis.name]), error);
-        values.pop().map(|value| value.of(axis.name))
+        let uncertainty = Some(of_interval([minutes(earliest), minutes(latest)], 0));
+        let value = Value::new("stable-after", minutes(after), f64::NAN, "min", about);
+        Some(Value { uncertainty, ..value }.of(axis.name))
     }
+}
+
+/// What is known of a value by its interval.
+fn of_interval(interval_95: [f64; 2], draws: usize) -> Uncertainty {
+    Uncertainty::new((interval_95[1] - interval_95[0]) / (2.0 * NORMAL_95), interval_95, draws)
+}
+
+/// The axes' ranges, and the root of the sum of their squares.
+fn with_combined(mut ranges: Vec<f64>) -> Vec<f64> {
+    ranges.push(ranges.iter().map(|range| range * range).sum::<f64>().sqrt());
+    ranges
 }
 
 /// One axis: means over the windows, smoothed a little, and the noise of one.
@@ -192,15 +214,33 @@ struct Axis {
     name: &'static str,
     means: Vec<f64>,
     smooth: Vec<f64>,
-    /// Smoothed over far more: without noise.
-    course: Vec<f64>,
     noise_um: f64,
+}
+
+impl Axis {
+    /// The range less what noise may have raised it by.
+    fn least(&self, draw: &mut Draw) -> f64 {
+        let farthest = |sign: f64| {
+            let out = self.means.iter().map(|mean| sign * mean).fold(f64::NEG_INFINITY, f64::max);
+            let near = self.means.iter().filter(|mean| sign * **mean >= out - REACH * self.noise_um);
+            near.count().max(1)
+        };
+        let mut largest = |count: usize| (0..count).map(|_| draw.normal()).fold(f64::NEG_INFINITY, f64::max);
+        (range(&self.means) - self.noise_um * (largest(farthest(1.0)) + largest(farthest(-1.0)))).max(0.0)
+    }
+
+    /// The range and what noise may have taken from it.
+    fn most(&self, draw: &mut Draw) -> f64 {
+        (range(&self.means) + self.noise_um * (draw.normal() - draw.normal())).max(0.0)
+    }
 }
 
 struct Test {
     times_min: Vec<f64>,
     axes: Vec<Axis>,
     temperatures: Option<Vec<f64>>,
+    /// Windows without readings, or with few, and all.
+    empty: [usize; 2],
 }
 
 impl Test {
@@ -216,8 +256,14 @@ impl Test {
         let start_s = times_s.first().copied().unwrap_or_default();
         let window = |time_s: f64| ((time_s - start_s) / window_s).floor() as i64;
         let blocks: Vec<&[f64]> = times_s.chunk_by(|a, b| window(*a) == window(*b)).collect();
-        if blocks.len() < FEWEST_MEANS {
-            let problem = format!("{} means over {window_s} s, expected at least {FEWEST_MEANS}", blocks.len());
+        let mut counts: Vec<usize> = blocks.iter().map(|block| block.len()).collect();
+        counts.sort_unstable();
+        let usual = counts.get(counts.len() / 2).copied().unwrap_or_default();
+        let is_filled = |block: &&[f64]| block.len() as f64 >= FILLED * usual as f64;
+        let filled = blocks.iter().filter(|block| is_filled(block)).count();
+        let all = times_s.last().map_or(0, |last| window(*last) + 1);
+        if filled < FEWEST_MEANS {
+            let problem = format!("{filled} means over {window_s} s, expected at least {FEWEST_MEANS}");
             return Err(refuse(problem, "record for longer, or state a shorter `window_s`"));
         }
         let means = |column: &[f64]| -> Vec<f64> {
@@ -225,7 +271,9 @@ impl Test {
             let mut means = Vec::with_capacity(blocks.len());
             for block in &blocks {
                 let (own, after) = rest.split_at(block.len());
-                means.push(own.iter().sum::<f64>() / own.len() as f64);
+                if is_filled(block) {
+                    means.push(own.iter().sum::<f64>() / own.len() as f64);
+                }
                 rest = after;
             }
             means
@@ -234,9 +282,7 @@ impl Test {
             .iter()
             .filter_map(|(column, name)| {
                 let means = means(points.column(column).ok()?);
-                let wide = ((WIDE * means.len() as f64) as usize).max(BESIDE);
-                let (smooth, course) = (smoothed(&means, BESIDE), smoothed(&means, wide));
-                Some(Axis { name, smooth, course, noise_um: noise_of(&means), means })
+                Some(Axis { name, smooth: smoothed(&means, BESIDE), noise_um: noise_of(&means), means })
             })
             .collect();
         if axes.is_empty() {
@@ -245,21 +291,14 @@ impl Test {
         }
         let times_min = means(times_s).into_iter().map(|time_s| (time_s - start_s) / 60.0).collect();
         let temperatures = points.column(TEMPERATURE).ok().map(means);
-        Ok(Self { times_min, axes, temperatures })
+        let all = usize::try_from(all).unwrap_or_default();
+        Ok(Self { times_min, axes, temperatures, empty: [all.saturating_sub(filled), all] })
     }
 
-    /// The axes of the machine that is measured again: with the noise of its means, or smoothed.
-    fn courses(&self, machine: Machine) -> Vec<Vec<f64>> {
-        let of = |axis: &Axis| if machine == Machine::Most { axis.means.clone() } else { axis.course.clone() };
-        self.axes.iter().map(of).collect()
-    }
-
-    /// Courses with the noise of means.
-    fn again(&self, courses: &[Vec<f64>], draw: &mut Draw) -> Vec<Vec<f64>> {
-        let mut with = |(course, axis): (&Vec<f64>, &Axis)| -> Vec<f64> {
-            course.iter().map(|one| one + axis.noise_um * draw.normal()).collect()
-        };
-        courses.iter().zip(&self.axes).map(&mut with).collect()
+    /// What is said of windows without readings.
+    fn gap(&self) -> Option<String> {
+        let [empty, all] = self.empty;
+        (empty > 0).then(|| format!("{empty} of {all} windows have no reading, or less than half of the others': they are left out, and what the axes did there is in no value"))
     }
 
     fn tables(&self) -> Result<Vec<TableRows>> {
@@ -298,11 +337,14 @@ fn smoothed(means: &[f64], beside: usize) -> Vec<f64> {
     (0..means.len()).map(around).collect()
 }
 
-/// Standard deviation of the noise of means, from their second differences.
+/// Standard deviation of the noise of means, from the median of their second differences: steps are few of them. Where most are 0, as of a
+/// coarse resolution, their root mean square.
 fn noise_of(means: &[f64]) -> f64 {
-    let differences = means.windows(3).map(|three| three[1] - 0.5 * (three[0] + three[2]));
-    let squares: f64 = differences.map(|difference| difference * difference).sum();
-    (squares / (OF_SECOND_DIFFERENCES * means.len().saturating_sub(2).max(1) as f64)).sqrt()
+    let mut sizes: Vec<f64> = means.windows(3).map(|three| (three[1] - 0.5 * (three[0] + three[2])).abs()).collect();
+    sizes.sort_by(f64::total_cmp);
+    let median = sizes.get(sizes.len() / 2).copied().unwrap_or_default() / NORMAL_MEDIAN;
+    let rms = (sizes.iter().map(|size| size * size).sum::<f64>() / sizes.len().max(1) as f64).sqrt();
+    (if median > 0.0 { median } else { rms }) / OF_SECOND_DIFFERENCES.sqrt()
 }
 
 /// The first place from which on a course stays within a band about its mean over the last tenth; nothing where it leaves it there.
