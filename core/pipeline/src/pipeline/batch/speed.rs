@@ -13,6 +13,7 @@ use super::{
     trend::{RECORDING, recording_column},
 };
 use crate::summary::Summary;
+use runout_draws::Uncertainty;
 use runout_error::Result;
 use runout_table::{
     Array, ColumnSpec, Figure, Float64Array, Measure, RecordBatch, TableSpec, numbers, numbers_or_null, texts,
@@ -40,6 +41,8 @@ pub(crate) fn table() -> TableSpec {
             ColumnSpec::name("series", "the value: symbol, reference, filter, where, unit"),
             value("value", "the value; null where it is not known"),
             value("std", "its standard uncertainty; null where it is not known"),
+            value("low_95", "lower end of the 95 % interval; null where it is not known"),
+            value("high_95", "upper end of the 95 % interval; null where it is not known"),
         ],
     )
     .optional()
@@ -117,6 +120,7 @@ struct Row {
     series: String,
     value: f64,
     std: Option<f64>,
+    interval_95: Option<[f64; 2]>,
 }
 
 impl Speeds {
@@ -137,7 +141,8 @@ impl Speeds {
             |name: &str| values.column_by_name(name).and_then(|column| column.as_any().downcast_ref::<Float64Array>());
         let (symbols, recordings) = (texts_of(values, "symbol"), texts_of(values, RECORDING));
         let names = columns_of(values);
-        let (column, stds) = (number("value"), number("std"));
+        let column = number("value");
+        let known = ["std", "low_95", "high_95"].map(number);
         let mut rows = Vec::new();
         for place in 0..values.num_rows() {
             let is_motion = |symbol: &str| ERROR_MOTION.iter().any(|start| symbol.starts_with(start));
@@ -147,9 +152,11 @@ impl Speeds {
             }
             let recording = recordings.value(place).to_owned();
             let Some(speed_rpm) = self.rpm.get(&recording).copied() else { continue };
-            let std = stds.filter(|stds| stds.is_valid(place)).map(|stds| stds.value(place));
+            let [std, low, high] =
+                known.map(|column| column.filter(|column| column.is_valid(place)).map(|column| column.value(place)));
             let series = label(&names_at(&names, place), 1);
-            rows.push(Row { recording, speed_rpm, series, value: column.value(place), std });
+            let interval_95 = low.zip(high).map(|(low, high)| [low, high]);
+            rows.push(Row { recording, speed_rpm, series, value: column.value(place), std, interval_95 });
         }
         self.table_of(&rows)
     }
@@ -177,6 +184,8 @@ impl Speeds {
             texts(rows.iter().map(|row| row.series.as_str())),
             numbers_or_null(rows.iter().map(|row| Some(row.value).filter(|value| value.is_finite()))),
             numbers_or_null(rows.iter().map(|row| row.std)),
+            numbers_or_null(rows.iter().map(|row| row.interval_95.map(|[low, _]| low))),
+            numbers_or_null(rows.iter().map(|row| row.interval_95.map(|[_, high]| high))),
         ])
     }
 
@@ -249,7 +258,11 @@ fn shifts_of(one: &AtSpeed, slowest: &AtSpeed, rig: &Rig) -> Vec<Row> {
         let Some(shift) = shift(changes) else { continue };
         for (axis, (value, std)) in ["x", "y"].into_iter().zip(shift) {
             let series = format!("axis-shift-{axis}, section {}, setup {setup}, {station} / um", rig.sections[section]);
-            rows.push(Row { recording: one.recording.clone(), speed_rpm: one.speed_rpm, series, value, std });
+            // The slowest is what the others are counted from.
+            let std = std.filter(|_| one.recording != slowest.recording);
+            let interval_95 = std.map(|std| Uncertainty::normal(value, std).interval_95);
+            let (recording, speed_rpm) = (one.recording.clone(), one.speed_rpm);
+            rows.push(Row { recording, speed_rpm, series, value, std, interval_95 });
         }
     }
     rows
