@@ -17,6 +17,8 @@
 //! the windows that may be farthest out on each side; so R ≥ R̂ − σ (max ε + max ε′). The interval is from the 2.5 % quantile of the latter to the
 //! 97.5 % quantile of the former. It holds for every course.
 
+mod course;
+
 use runout_core::{
     Error, ErrorKind, Result,
     draws::{NORMAL_95, Uncertainty, seed},
@@ -31,25 +33,22 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use crate::draws::Draw;
+use course::{OF_SECOND_DIFFERENCES, noise_of, range, smoothed, stable_after};
 
 /// Means that a test has at least: fewer show neither their noise nor a course.
 const FEWEST_MEANS: usize = 20;
-/// Share of the test at its end that says where an axis is.
-const END: f64 = 0.1;
 /// Share of an axis's own range that is stable where no length is stated.
 const STABLE: f64 = 0.1;
 /// Means on each side of one that stability is looked at over.
 const BESIDE: usize = 2;
-/// What a mean of second differences has of the variance of single means: 1 + 1/4 + 1/4.
-const OF_SECOND_DIFFERENCES: f64 = 1.5;
-/// Median of the distance of normal numbers from 0, in standard deviations.
-const NORMAL_MEDIAN: f64 = 0.674_489_75;
 /// Windows so many standard deviations of a mean below the farthest one are not farther out: noise does that to one in 1e6 pairs.
 const REACH: f64 = 7.0;
 /// Draws of the noise.
 const DRAWS: usize = 1000;
 /// Standard deviations of a smoothed mean by which noise moves a band in or out at most.
 const AT_MOST: f64 = 3.0;
+/// Share of a range that one window alone may be of it without a remark.
+const MATTERS: f64 = 0.05;
 /// Windows with less than this share of the readings of most are left out.
 const FILLED: f64 = 0.5;
 
@@ -168,6 +167,7 @@ impl Drift {
             values.push(Value { of, uncertainty, ..Value::new(symbol, value, f64::NAN, "um", about) }.key());
         }
         for axis in &test.axes {
+            remarks.extend(axis.alone(&test.times_min));
             values.extend(self.stability(test, axis, remarks));
         }
         values
@@ -227,6 +227,24 @@ impl Axis {
         };
         let mut largest = |count: usize| (0..count).map(|_| draw.normal()).fold(f64::NEG_INFINITY, f64::max);
         (range(&self.means) - self.noise_um * (largest(farthest(1.0)) + largest(farthest(-1.0)))).max(0.0)
+    }
+
+    /// What is said where the range is that of one window, unlike those beside it.
+    fn alone(&self, times_min: &[f64]) -> Option<String> {
+        let whole = range(&self.means);
+        let stands_out = |place: usize| {
+            let beside = 0.5 * (self.means[place - 1] + self.means[place + 1]);
+            (self.means[place] - beside).abs() > REACH * OF_SECOND_DIFFERENCES.sqrt() * self.noise_um
+        };
+        (1..self.means.len() - 1).filter(|place| stands_out(*place)).find_map(|place| {
+            let others = range(&[&self.means[..place], &self.means[place + 1..]].concat());
+            (others < (1.0 - MATTERS) * whole).then(|| {
+                format!(
+                    "the range of {} is {whole:.3} µm by one window alone, at {:.1} min: {others:.3} µm without it; look at its readings",
+                    self.name, times_min[place]
+                )
+            })
+        })
     }
 
     /// The range and what noise may have taken from it.
@@ -319,40 +337,6 @@ impl Test {
         }
         Ok(tables)
     }
-}
-
-fn range(course: &[f64]) -> f64 {
-    let ends = |(low, high): (f64, f64), one: &f64| (low.min(*one), high.max(*one));
-    let (low, high) = course.iter().fold((f64::INFINITY, f64::NEG_INFINITY), ends);
-    high - low
-}
-
-/// Means over neighbours on both sides.
-fn smoothed(means: &[f64], beside: usize) -> Vec<f64> {
-    let around = |place: usize| {
-        let beside = beside.min(place).min(means.len() - 1 - place);
-        let own = &means[place - beside..=place + beside];
-        own.iter().sum::<f64>() / own.len() as f64
-    };
-    (0..means.len()).map(around).collect()
-}
-
-/// Standard deviation of the noise of means, from the median of their second differences: steps are few of them. Where most are 0, as of a
-/// coarse resolution, their root mean square.
-fn noise_of(means: &[f64]) -> f64 {
-    let mut sizes: Vec<f64> = means.windows(3).map(|three| (three[1] - 0.5 * (three[0] + three[2])).abs()).collect();
-    sizes.sort_by(f64::total_cmp);
-    let median = sizes.get(sizes.len() / 2).copied().unwrap_or_default() / NORMAL_MEDIAN;
-    let rms = (sizes.iter().map(|size| size * size).sum::<f64>() / sizes.len().max(1) as f64).sqrt();
-    (if median > 0.0 { median } else { rms }) / OF_SECOND_DIFFERENCES.sqrt()
-}
-
-/// The first place from which on a course stays within a band about its mean over the last tenth; nothing where it leaves it there.
-fn stable_after(course: &[f64], band_um: f64) -> Option<usize> {
-    let end = course.len() - ((END * course.len() as f64) as usize).max(1);
-    let last = course[end..].iter().sum::<f64>() / (course.len() - end) as f64;
-    let after = course.iter().rposition(|one| (one - last).abs() > band_um).map_or(0, |place| place + 1);
-    (after <= end).then_some(after)
 }
 
 fn drift_table() -> TableSpec {

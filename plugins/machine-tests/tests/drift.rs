@@ -139,6 +139,20 @@ fn windows_without_readings_are_left_out() {
     );
 }
 
+/// One reading that is 500 µm off is a range of its own, and is said; sound courses are not.
+#[test]
+fn a_range_by_one_window_is_said() {
+    let said = |points: &Points| {
+        separated("", points).unwrap().remarks.into_iter().find(|remark| remark.contains("by one window alone"))
+    };
+    let mut points = recorded(7, 0.3);
+    assert_eq!(said(&points), None);
+    let z = points.columns.iter_mut().find(|column| column.name == "z_um").unwrap();
+    z.values[20_000] += 500.0;
+    let said = said(&points).unwrap();
+    assert!(said.contains("range of Z") && said.contains("333.5 min"), "{said}");
+}
+
 /// Z is within 1 µm of its end from when the truth is; Y swings and does not come to rest.
 #[test]
 fn the_time_to_stability_is_that_of_the_course() {

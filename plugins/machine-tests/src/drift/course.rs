@@ -1,0 +1,43 @@
+//! A course of means over windows: range, noise, and when it comes to rest.
+
+/// Share of the test at its end that says where an axis is.
+const END: f64 = 0.1;
+/// Median of the distance of normal numbers from 0, in standard deviations.
+const NORMAL_MEDIAN: f64 = 0.674_489_75;
+/// What a mean of second differences has of the variance of single means: 1 + 1/4 + 1/4.
+pub(super) const OF_SECOND_DIFFERENCES: f64 = 1.5;
+
+/// Highest less lowest.
+pub(super) fn range(course: &[f64]) -> f64 {
+    let ends = |(low, high): (f64, f64), one: &f64| (low.min(*one), high.max(*one));
+    let (low, high) = course.iter().fold((f64::INFINITY, f64::NEG_INFINITY), ends);
+    high - low
+}
+
+/// Means over neighbours on both sides.
+pub(super) fn smoothed(means: &[f64], beside: usize) -> Vec<f64> {
+    let around = |place: usize| {
+        let beside = beside.min(place).min(means.len() - 1 - place);
+        let own = &means[place - beside..=place + beside];
+        own.iter().sum::<f64>() / own.len() as f64
+    };
+    (0..means.len()).map(around).collect()
+}
+
+/// Standard deviation of the noise of means, from the median of their second differences: steps are few of them. Where most are 0, as of a
+/// coarse resolution, their root mean square.
+pub(super) fn noise_of(means: &[f64]) -> f64 {
+    let mut sizes: Vec<f64> = means.windows(3).map(|three| (three[1] - 0.5 * (three[0] + three[2])).abs()).collect();
+    sizes.sort_by(f64::total_cmp);
+    let median = sizes.get(sizes.len() / 2).copied().unwrap_or_default() / NORMAL_MEDIAN;
+    let rms = (sizes.iter().map(|size| size * size).sum::<f64>() / sizes.len().max(1) as f64).sqrt();
+    (if median > 0.0 { median } else { rms }) / OF_SECOND_DIFFERENCES.sqrt()
+}
+
+/// The first place from which on a course stays within a band about its mean over the last tenth; nothing where it leaves it there.
+pub(super) fn stable_after(course: &[f64], band_um: f64) -> Option<usize> {
+    let end = course.len() - ((END * course.len() as f64) as usize).max(1);
+    let last = course[end..].iter().sum::<f64>() / (course.len() - end) as f64;
+    let after = course.iter().rposition(|one| (one - last).abs() > band_um).map_or(0, |place| place + 1);
+    (after <= end).then_some(after)
+}
