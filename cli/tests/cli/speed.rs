@@ -118,5 +118,6 @@ fn twelve_speeds_give_values_over_rpm_and_the_shift_of_the_axis() {
         fs::read_to_string(folder.path().join("out/report.html")).unwrap().contains("Error motion against the speed")
     );
     let shown = folder.run(&words(&[])).stdout;
+    println!("{shown}");
     assert!(shown.contains("Error motion against the speed") && shown.contains("axis-shift-x"), "{shown}");
 }
