@@ -52,30 +52,55 @@ impl Neighbours {
         covariance
     }
 
-    /// Takes out what a channel creeps: `course` gives each turn's mean level and its rise over the turn, in µm. Nothing happens
-    /// to a channel that is not there.
-    pub fn take_out(&mut self, channel: usize, course: &[[f64; 2]]) {
+    /// Takes a known signal out of a channel: `of` gives, for each [`Beside`], the mean of the signal times e^{iνθ} over the record as a
+    /// function of ν, θ counted from each turn's start. Nothing happens to a channel that is not there.
+    pub fn take_out<At: Fn(f64) -> Complex64>(&mut self, channel: usize, of: impl Fn(Beside) -> At) {
         if channel >= self.channels {
             return;
         }
-        let count = course.len().max(1) as f64;
-        let [level, rise] = [0, 1].map(|which| course.iter().map(|turn| turn[which]).sum::<f64>() / count);
         for (index, values) in self.coefficients.iter_mut().enumerate() {
-            let (beside, side) = (index / 2 + 1, index % 2);
-            let (mut levels, mut rises) = (Complex64::ZERO, Complex64::ZERO);
-            for (turn, [of_level, of_rise]) in course.iter().enumerate() {
-                let phase = Complex64::cis(-TAU * ((beside * turn % self.period) as f64 / self.period as f64)) / count;
-                levels += phase * (of_level - level);
-                rises += phase * (of_rise - rise);
-            }
-            let share = beside as f64 / self.period as f64;
+            let (beside, side) = (Beside { by: index / 2 + 1, period: self.period }, index % 2);
+            let (at, share) = (of(beside), beside.by as f64 / self.period as f64);
             for order in 0..values.len() / self.channels {
-                let at = if side == 0 { order as f64 } else { -(order as f64) } - share;
-                let [flat, ramp] = ramp(at, self.angles);
-                let found = (levels * flat + rises * ramp) * if order == 0 { 1.0 } else { 2.0 };
+                let nu = if side == 0 { order as f64 } else { -(order as f64) } - share;
+                let found = at(nu) * if order == 0 { 1.0 } else { 2.0 };
                 values[order * self.channels + channel] -= if side == 0 { found } else { found.conj() };
             }
         }
+    }
+
+    /// Takes out what a channel creeps: `course` gives each turn's mean level and its rise over the turn, in µm.
+    pub fn take_out_course(&mut self, channel: usize, course: &[[f64; 2]]) {
+        let count = course.len().max(1) as f64;
+        let [level, rise] = [0, 1].map(|which| course.iter().map(|turn| turn[which]).sum::<f64>() / count);
+        let angles = self.angles;
+        self.take_out(channel, |beside| {
+            let (mut levels, mut rises) = (Complex64::ZERO, Complex64::ZERO);
+            for (turn, [of_level, of_rise]) in course.iter().enumerate() {
+                let phase = beside.phase(turn) / count;
+                levels += phase * (of_level - level);
+                rises += phase * (of_rise - rise);
+            }
+            move |nu| {
+                let [flat, ramp] = ramp(nu, angles);
+                levels * flat + rises * ramp
+            }
+        });
+    }
+}
+
+/// A place k beside a whole order in a record of P turns.
+#[derive(Debug, Clone, Copy)]
+pub struct Beside {
+    by: usize,
+    period: usize,
+}
+
+impl Beside {
+    /// e^{−2πikm/P} of the m-th turn.
+    #[must_use]
+    pub fn phase(self, turn: usize) -> Complex64 {
+        Complex64::cis(-TAU * ((self.by * turn % self.period) as f64 / self.period as f64))
     }
 }
 

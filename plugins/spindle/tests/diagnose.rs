@@ -16,7 +16,7 @@ use runout_core::{
     model::{
         Fit, Model, Setting,
         closed_loop::Settings,
-        diagnosis::{Estimated, Verdict},
+        diagnosis::{Added, Estimated, Verdict},
     },
     numerics::fourier::Fourier,
     rig::SensorConfig,

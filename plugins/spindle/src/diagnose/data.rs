@@ -11,16 +11,16 @@ use runout_core::{
 
 use super::{
     TRACED_ORDERS,
-    changes::{self, Change},
-    drift::{self, Creeping, Part},
-    lines::{self, Line},
+    drift::Part,
+    steadied::steadied,
+    turn_observations::TurnObservations,
     weighed::{Weighed, floor},
 };
 use crate::{
     effects::{Alterations, SpindleEffect, TurnEvidence},
     layout::Layout,
     selection::Selection,
-    solve::{Blocks, Readings, Scatter, smooth_by_order},
+    solve::{Blocks, Readings, smooth_by_order},
 };
 
 /// Everything about a measurement that no effect changes.
@@ -119,35 +119,8 @@ pub(crate) struct StationData {
     /// Sensor, mean creep a turn where it is largest and its standard uncertainty, where the levels show a drift for certain: one observation
     /// more, since a creep of one sensor can look like a motion in the averaged turn.
     pub creeps: Vec<(usize, f64, f64)>,
-    /// Covariance of the averages with the drifts that single turns show still in it.
-    unsteadied: Option<Vec<Vec<Complex64>>>,
-}
-
-/// What the single turns of a station show, and their average does not.
-pub(crate) struct TurnObservations {
-    /// What their levels say of each sensor's creep.
-    pub creeping: Vec<Option<Creeping>>,
-    /// Changes within a setup.
-    pub changes: Vec<Change>,
-    /// Asynchronous lines.
-    pub lines: Vec<Line>,
-}
-
-impl TurnObservations {
-    /// `creeping` is what the levels of all stations say of each sensor.
-    pub(crate) fn new(
-        selection: &Selection,
-        layout: &Layout,
-        station: &Station,
-        creeping: Vec<Option<Creeping>>,
-    ) -> Self {
-        let max_order = station.profiles.iter().map(Profile::max_order).min().unwrap_or(0);
-        Self {
-            changes: changes::changes(selection, station, &creeping),
-            lines: lines::lines(selection, layout, station, max_order),
-            creeping,
-        }
-    }
+    /// Covariance of the averages with the drifts and lines that single turns show still in it.
+    recorded: Option<Vec<Vec<Complex64>>>,
 }
 
 impl StationData {
@@ -158,20 +131,18 @@ impl StationData {
         station: &Station,
         seen: &Arc<TurnObservations>,
     ) -> Result<Self> {
-        let steadied = |profile: &Profile| {
-            let mut steadied = Profile { split: None, ..profile.clone() };
-            let neighbours = profile.split.as_ref().and_then(|split| split.neighbours.as_ref());
-            drift::steady(&mut steadied, neighbours, selection, &seen.creeping, Part::All);
-            steadied
-        };
-        let mut data = if seen.creeping.iter().flatten().all(|creeping| !creeping.certain()) {
-            Self::new(selection, layout, station, None, Part::All, Arc::clone(seen))?
+        let of = |station: &Station| Self::new(selection, layout, station, None, Part::All, Arc::clone(seen));
+        let mut data = if seen.is_steady() {
+            of(station)?
         } else {
+            let steadied = |profile: &Profile| {
+                let neighbours = profile.split.as_ref().and_then(|split| split.neighbours.as_ref());
+                let whole = Profile { split: None, ..profile.clone() };
+                steadied(whole, neighbours, selection, seen, Part::All)
+            };
             let profiles = station.profiles.iter().map(steadied).collect();
-            let steadied = Station { name: station.name.clone(), z_mm: station.z_mm, profiles };
-            let plain = Self::new(selection, layout, station, None, Part::All, Arc::clone(seen))?;
-            let steadied = Self::new(selection, layout, &steadied, None, Part::All, Arc::clone(seen))?;
-            Self { unsteadied: plain.readings.covariance, ..steadied }
+            let steadied = of(&Station { name: station.name.clone(), z_mm: station.z_mm, profiles })?;
+            Self { recorded: of(station)?.readings.covariance, ..steadied }
         };
         // The weights are made of it, and nothing else is.
         data.readings.scatter = None;
@@ -190,9 +161,7 @@ impl StationData {
             let profile = |profile: &Profile| {
                 let split = profile.split.as_ref()?;
                 let turns = which(split);
-                let mut steadied = split.profile(profile, turns);
-                drift::steady(&mut steadied, turns.neighbours.as_ref(), selection, &seen.creeping, part);
-                Some(steadied)
+                Some(steadied(split.profile(profile, turns), turns.neighbours.as_ref(), selection, seen, part))
             };
             let profiles = station.profiles.iter().map(profile).collect::<Option<_>>()?;
             Some(Station { name: station.name.clone(), z_mm: station.z_mm, profiles })
@@ -214,16 +183,8 @@ impl StationData {
         part: Part,
         seen: Arc<TurnObservations>,
     ) -> Result<Self> {
-        // A fit of all turns has the weights of a run, but where a drift has to be taken out of them first.
-        let steady = seen.creeping.iter().flatten().all(|creeping| !creeping.certain());
-        let scatter = if part == Part::All && steady { Scatter::Beside } else { Scatter::OfAll };
-        let mut readings = Readings::gather(selection, layout, fit, scatter)?;
-        for (sensor, creeping) in seen.creeping.iter().enumerate() {
-            if let Some(creeping) = creeping {
-                creeping.take_out_of_scatter(&mut readings, sensor, part);
-            }
-        }
-        let leaks = seen.lines.iter().map(|line| line.leak(part).to_vec()).collect();
+        let mut readings = Readings::gather(selection, layout, fit)?;
+        let leaks = seen.lines.found.iter().map(|line| line.leak(part, readings.max_order)).collect();
         let creeps = seen.creeping.iter().enumerate().filter_map(|(sensor, creeping)| {
             let (creep, std) = creeping.as_ref().filter(|creeping| creeping.certain())?.observed(part);
             Some((sensor, creep, std))
@@ -231,8 +192,7 @@ impl StationData {
         let creeps = creeps.collect();
         smooth_by_order(&mut readings);
         seen.changes.iter().for_each(|change| change.widen(&mut readings));
-        let held_out =
-            held_out.map(|station| Readings::gather(selection, layout, station, Scatter::OfAll)).transpose()?;
+        let held_out = held_out.map(|station| Readings::gather(selection, layout, station)).transpose()?;
         let held_out = held_out.map(|readings| Readings { scatter: None, ..readings });
         let freed = layout.assumes_odd_motion().then(|| {
             let freed = Alterations { even_order_motion: true, ..Alterations::none(layout) };
@@ -240,8 +200,8 @@ impl StationData {
         });
         let Weighed { readings, weights, floor, carried } = Weighed::new(layout, selection, readings);
         let name = fit.name.clone();
-        let unsteadied = None;
-        Ok(Self { name, part, readings, held_out, weights, floor, carried, freed, seen, leaks, creeps, unsteadied })
+        let recorded = None;
+        Ok(Self { name, part, readings, held_out, weights, floor, carried, freed, seen, leaks, creeps, recorded })
     }
 
     /// Effects as they act on the turns fitted, or on those held out: a creep differs between setups and slows down.
@@ -257,7 +217,7 @@ impl StationData {
     pub(crate) fn beside_averages(&self, alterations: &Alterations) -> Vec<f64> {
         let creeps =
             self.creeps.iter().map(|(sensor, creep, std)| (creep - alterations.sensors[*sensor].creep_um) / std);
-        let lines = self.seen.lines.iter().enumerate().map(|(number, line)| {
+        let lines = self.seen.lines.found.iter().enumerate().map(|(number, line)| {
             let (sensor, evidence) = line.row();
             if alterations.lines.contains(&(number, sensor)) { 0.0 } else { evidence.sqrt() }
         });
@@ -266,7 +226,7 @@ impl StationData {
 
     /// Whether single turns show what the average of the turns does not.
     fn is_seen_besides(&self) -> bool {
-        !self.creeps.is_empty() || !self.seen.lines.is_empty()
+        !self.creeps.is_empty() || !self.seen.lines.found.is_empty()
     }
 
     /// Leaves out the orders above `max_order`.
@@ -281,11 +241,13 @@ impl StationData {
         self.freed(alterations).map_or(&self.readings, |freed| &freed.readings)
     }
 
-    /// The covariance of the averages where a drift that single turns show is not taken out of them: its saw-tooth is in the averages, and
-    /// belongs to their uncertainty.
-    pub(crate) fn with_drifts(&self, alterations: &Alterations) -> Option<&Vec<Vec<Complex64>>> {
-        let stays = self.creeps.iter().any(|(sensor, ..)| alterations.sensors[*sensor].creep_um == 0.0);
-        self.unsteadied.as_ref().filter(|_| stays)
+    /// The covariance of the averages as recorded, where a drift or a line that single turns show is not taken out of them: its leak is in
+    /// the averages, and belongs to their uncertainty.
+    pub(crate) fn recorded_covariance(&self, alterations: &Alterations) -> Option<&Vec<Vec<Complex64>>> {
+        let drifts = self.creeps.iter().any(|(sensor, ..)| alterations.sensors[*sensor].creep_um == 0.0);
+        let mut lines = self.seen.lines.found.iter().enumerate();
+        let stays = drifts || lines.any(|(number, line)| !alterations.lines.contains(&(number, line.row().0)));
+        self.recorded.as_ref().filter(|_| stays)
     }
 
     /// Share of the variance at an order from 1 that lost orders carry into it.

@@ -1,4 +1,4 @@
-//! Drift from the levels of the turns (`runout_core::creep`): what it puts into averages and their covariance.
+//! Drift from the levels of the turns (`runout_core::creep`): what it puts into averages and their noise.
 
 use std::{ops::Range, sync::Arc};
 
@@ -7,14 +7,12 @@ use runout_core::{
     creep::{Creep, Levels, creeps},
     level_step::level_step,
     neighbours::Neighbours,
-    profile::{Profile, TurnLevels},
+    profile::TurnLevels,
     stage::Station,
 };
 
-use crate::{selection::Selection, solve::Readings};
+use crate::selection::Selection;
 
-/// Share of a variance that stays whatever is taken out of it.
-const LEAST_LEFT: f64 = 0.05;
 /// Neighbouring levels that count as one observation.
 const ALIKE: f64 = 4.0;
 
@@ -106,29 +104,19 @@ impl Creeping {
         (0..self.setups.len()).map(share).collect()
     }
 
-    /// Takes out of the scatter of single turns by how much their creep differs.
-    pub(crate) fn take_out_of_scatter(&self, readings: &mut Readings, sensor: usize, part: Part) {
-        if !self.certain() {
-            return;
-        }
-        let sensors = readings.count / readings.turns.len().max(1);
-        for (setup, matrices) in readings.scatter.iter_mut().flatten().enumerate() {
-            let mean = self.mean(setup, part);
-            let course = self.course(setup, self.turns(setup, part));
-            let turns = course.len().max(1) as f64;
-            let spread = course.iter().map(|[_, rise]| (rise - mean).powi(2)).sum::<f64>() / (turns * turns);
-            for (order, matrix) in matrices.chunks_exact_mut(sensors * sensors).enumerate().skip(2) {
-                let leak = spread / (std::f64::consts::PI * order as f64).powi(2);
-                let variance = matrix[sensor * sensors + sensor].re;
-                let left = (variance - leak).max(LEAST_LEFT * variance);
-                // Row and column alike, so that it stays a covariance.
-                let share = if variance > 0.0 { (left / variance).sqrt() } else { 1.0 };
-                for other in 0..sensors {
-                    matrix[sensor * sensors + other] *= share;
-                    matrix[other * sensors + sensor] *= share;
-                }
-            }
-        }
+    /// What it adds to the scatter of the mean over some turns of a setup, by order from 0: by how much the creep of its turns differs.
+    pub(super) fn scatter(&self, setup: usize, part: Part, orders: usize) -> Vec<f64> {
+        let mean = self.mean(setup, part);
+        let course = self.course(setup, self.turns(setup, part));
+        let turns = course.len().max(1) as f64;
+        let spread = course.iter().map(|[_, rise]| (rise - mean).powi(2)).sum::<f64>() / (turns * turns);
+        let of = |order: usize| if order < 2 { 0.0 } else { spread / (std::f64::consts::PI * order as f64).powi(2) };
+        (0..orders).map(of).collect()
+    }
+
+    /// Takes it out of what stands beside whole orders in some turns of a setup, in one of their channels.
+    pub(super) fn take_out_of(&self, neighbours: &mut Neighbours, setup: usize, part: Part, channel: usize) {
+        neighbours.take_out_course(channel, &self.course(setup, self.turns(setup, part)));
     }
 }
 
@@ -141,27 +129,6 @@ pub(crate) enum Part {
     HeldOut,
     /// All of them.
     All,
-}
-
-/// Takes out of the covariance of a profile's mean what drifts that are certain put into it: over the record they are no noise.
-pub(crate) fn steady(
-    profile: &mut Profile,
-    neighbours: Option<&Neighbours>,
-    selection: &Selection,
-    creeping: &[Option<Creeping>],
-    part: Part,
-) {
-    let Some(setup) = selection.setups.iter().position(|setup| *setup == profile.setup) else { return };
-    let known = selection.sensors.iter().zip(creeping);
-    let certain = known.filter_map(|(sensor, creeping)| Some((sensor, creeping.as_ref().filter(|one| one.certain())?)));
-    let mut certain = certain.peekable();
-    let (Some(_), Some(mut neighbours)) = (certain.peek(), neighbours.cloned()) else { return };
-    for (sensor, creeping) in certain {
-        if let Some(channel) = profile.sensors.iter().position(|known| known == sensor) {
-            neighbours.take_out(channel, &creeping.course(setup, creeping.turns(setup, part)));
-        }
-    }
-    profile.covariance = Some(neighbours.covariance());
 }
 
 /// What the levels of the turns say of each sensor's creep, `[station][sensor]`.

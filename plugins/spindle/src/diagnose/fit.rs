@@ -214,7 +214,7 @@ impl Fit for SpindleFit {
                     let creep = kind.creep_partials(place.index, *sensor).get(parameter).copied();
                     -creep.unwrap_or(0.0) / std
                 }));
-                column.extend(self.shared.data[index].seen.lines.iter().map(|_| 0.0));
+                column.extend(self.shared.data[index].seen.lines.found.iter().map(|_| 0.0));
             }
         }
         signature

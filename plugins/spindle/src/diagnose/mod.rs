@@ -13,7 +13,9 @@ mod remainder;
 mod rig_keys;
 mod said;
 mod solved;
+mod steadied;
 mod strangers;
+mod turn_observations;
 mod weighed;
 
 use std::sync::Arc;
@@ -36,9 +38,10 @@ use crate::{
     sizes, wiring,
 };
 use changes::Change;
-use data::{Shared, StationData, TurnObservations};
+use data::{Shared, StationData};
 pub use declared::DeclaredSpindle;
 pub use fit::SpindleFit;
+use turn_observations::TurnObservations;
 
 /// Orders that take part in tracing: form lives in the low ones, and time grows with their number.
 const TRACED_ORDERS: usize = 255;
@@ -293,7 +296,7 @@ fn run(model: &SpindleModel, stations: &[Station], settings: &Settings) -> Resul
         let sensor = (kind.about().acts_on == ActsOn::Sensor).then_some(place.index);
         kind.line().is_some_and(|number| {
             let has = |station: &StationData| {
-                let line = station.seen.lines.get(number);
+                let line = station.seen.lines.found.get(number);
                 line.is_some_and(|line| line.row().0 == sensor)
             };
             !model.traced.data.iter().any(has)

@@ -82,11 +82,11 @@ fn held_out(data: &StationData, solved: &Solved, layout: &Layout, alterations: &
     let mut held = data.held_out.clone()?;
     let later = data.altered(alterations, Part::HeldOut);
     let (mut chi2, mut squares) = (0.0, 0.0);
-    for (number, line) in data.seen.lines.iter().enumerate() {
+    for (number, line) in data.seen.lines.found.iter().enumerate() {
         let taken_out = alterations.lines.contains(&(number, line.row().0));
         chi2 += line.held_out()[usize::from(taken_out)];
         if taken_out {
-            line.take_out(line.leak(Part::HeldOut), layout, &mut held.mean);
+            line.take_out(&line.leak(Part::HeldOut, held.max_order), layout, &mut held.mean);
         }
     }
     for (sensor, creeping) in alterations.sensors.iter().zip(&data.seen.creeping) {

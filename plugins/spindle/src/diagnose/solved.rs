@@ -49,10 +49,10 @@ impl Shared {
 impl Solved {
     pub(crate) fn new(shared: &Shared, data: &StationData, layout: &Layout, alterations: &Alterations) -> Self {
         let mut corrected = data.readings(alterations).clone();
-        if let Some(covariance) = data.with_drifts(alterations) {
+        if let Some(covariance) = data.recorded_covariance(alterations) {
             corrected.covariance = Some(covariance.clone());
         }
-        for (number, (line, leak)) in data.seen.lines.iter().zip(&data.leaks).enumerate() {
+        for (number, (line, leak)) in data.seen.lines.found.iter().zip(&data.leaks).enumerate() {
             if alterations.lines.contains(&(number, line.row().0)) {
                 line.take_out(leak, layout, &mut corrected.mean);
             }

@@ -265,7 +265,7 @@ const RAD_PER_DEG: f64 = std::f64::consts::PI / 180.0;
 const LOW_ORDERS: std::ops::RangeInclusive<usize> = 1..=6;
 
 /// Lines of the turns' spectrum that are looked for.
-pub(crate) const MOST_LINES: usize = 3;
+pub(crate) const MOST_LINES: usize = 6;
 
 /// An effect for the registry.
 #[must_use]

@@ -24,7 +24,7 @@ pub(crate) use interpolation::interpolate;
 pub(crate) use operators::{Operators, OrderOperator};
 pub(crate) use projection::projection;
 pub(crate) use propagation::Propagation;
-pub(crate) use readings::{RESAMPLING, Readings, Scatter};
+pub(crate) use readings::{RESAMPLING, Readings};
 pub(crate) use residual::{by_reading, judged_residual};
 pub(crate) use second_order::OVERSAMPLING;
 pub(crate) use solution::Solver;

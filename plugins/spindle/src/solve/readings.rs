@@ -40,21 +40,12 @@ pub(crate) struct Readings {
     pub places: Vec<usize>,
 }
 
-/// Which scatter of the turns weights are taken from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Scatter {
-    /// That of all turns: the closed loop takes drifts and lines out of it.
-    OfAll,
-    /// Where it is known, that without the neighbours which the covariance is taken from: then weights do not know its noise.
-    Beside,
-}
-
 impl Readings {
-    /// Gathers the profiles of a station, with the scatter that weights are taken from.
+    /// Gathers the profiles of a station.
     ///
     /// # Errors
     /// When a setup or a sensor of the rig is missing, or the profiles' angles differ.
-    pub(crate) fn gather(selection: &Selection, layout: &Layout, station: &Station, scatter: Scatter) -> Result<Self> {
+    pub(crate) fn gather(selection: &Selection, layout: &Layout, station: &Station) -> Result<Self> {
         let object = || format!("station {}", station.name);
         let rig = &selection.rig;
         let sensors = rig.sensors.len();
@@ -108,10 +99,7 @@ impl Readings {
             turn_angles: ordered.iter().map(|(profile, _)| profile.turn_angles).collect(),
             mean,
             covariance: matrices(|profile| profile.covariance.as_ref()),
-            scatter: matrices(match scatter {
-                Scatter::OfAll => |profile| profile.scatter.as_ref(),
-                Scatter::Beside => |profile| profile.scatter_beside.as_ref().or(profile.scatter.as_ref()),
-            }),
+            scatter: matrices(|profile| profile.scatter_beside.as_ref().or(profile.scatter.as_ref())),
             turns: ordered.iter().map(|(profile, _)| profile.turns.used).collect(),
             near_tones: ordered.iter().map(|(profile, channels)| leaks(profile, channels)).collect(),
             angle_std_rad: ordered.iter().map(|(profile, _)| profile.angle_std_rad).collect(),

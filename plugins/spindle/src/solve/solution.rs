@@ -16,7 +16,7 @@ use super::{
     leak,
     operators::Operators,
     propagation::Propagation,
-    readings::{Readings, Scatter},
+    readings::Readings,
     residual::{by_reading, judged_residual},
     second_order::{COUPLED, SecondOrder},
     weights,
@@ -60,7 +60,7 @@ impl Solver<'_> {
         station: &Station,
         method: impl FnOnce(&Readings) -> Operators,
     ) -> Result<(Separation, Readings)> {
-        let mut readings = Readings::gather(self.selection, self.layout, station, Scatter::Beside)?;
+        let mut readings = Readings::gather(self.selection, self.layout, station)?;
         weights::smooth_by_order(&mut readings);
         if self.second_order {
             leak::widen(self.layout, self.selection.rig.part_radius_mm, &mut readings);
@@ -232,7 +232,7 @@ impl Solver<'_> {
         station: &Station,
         method: impl FnOnce(&Readings) -> Operators,
     ) -> Result<Sensitivity> {
-        let mut readings = Readings::gather(self.selection, self.layout, station, Scatter::Beside)?;
+        let mut readings = Readings::gather(self.selection, self.layout, station)?;
         weights::smooth_by_order(&mut readings);
         let operators = method(&readings);
         let to_reference = self.layout.to_reference(self.layout.mean_z_mm + station.z_mm);

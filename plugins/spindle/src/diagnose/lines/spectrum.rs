@@ -5,7 +5,6 @@ use std::f64::consts::TAU;
 use runout_core::{Complex64, numerics::fourier::Fourier};
 
 use super::turns::Capture;
-use crate::effects::MOST_LINES;
 
 /// A line's power is this many times that of the largest peak which is none.
 const ALONE: f64 = 4.0;
@@ -16,8 +15,8 @@ pub(super) const SLOWEST: f64 = 0.25;
 /// Bins of the windowed spectrum (of 1/turns) to both sides that belong to a peak.
 const WIDTH: f64 = 3.0;
 
-/// Orders of the peaks that stand out.
-pub(super) fn peaks(captures: &[Capture]) -> Vec<f64> {
+/// Orders of the peaks that stand out, so many at most.
+pub(super) fn peaks(captures: &[Capture], most: usize) -> Vec<f64> {
     let turns = captures.iter().map(|one| one.turns.count()).min().unwrap_or(0);
     let longest = captures.iter().map(|one| one.turns.numbers.last().map_or(0, |last| last + 1 - one.turns.numbers[0]));
     let length = (2 * longest.max().unwrap_or(0)).next_power_of_two();
@@ -50,7 +49,7 @@ pub(super) fn peaks(captures: &[Capture]) -> Vec<f64> {
     let mut left: Vec<Option<(f64, f64)>> = power.into_iter().map(Some).collect();
     // What hardly changes from turn to turn is the average, and its wandering.
     left.iter_mut().take(apart).for_each(|bin| *bin = None);
-    while peaks.len() <= MOST_LINES {
+    while peaks.len() <= most {
         let best = left.iter().enumerate().filter_map(|(bin, entry)| entry.map(|(power, at)| (power, at, bin)));
         let Some((size, at, bin)) = best.max_by(|a, b| a.0.total_cmp(&b.0)) else { break };
         let end = (bin + apart + 1).min(left.len());
@@ -63,13 +62,13 @@ pub(super) fn peaks(captures: &[Capture]) -> Vec<f64> {
         let (last, next) = (peaks[count - 1].0, peaks.get(*count).map_or(0.0, |peak| peak.0));
         last > ALONE * next && last > PROMINENT * median
     };
-    let count = (1..=peaks.len().min(MOST_LINES)).find(stands_out).unwrap_or(0);
+    let count = (1..=peaks.len().min(most)).find(stands_out).unwrap_or(0);
     peaks.into_iter().take(count).map(|(_, at)| at).collect()
 }
 
 /// Adds the windowed power of one harmonic's series over the turns: what turns forward, and what turns backward.
 fn add_spectrum(capture: &Capture, order: usize, channel: usize, fourier: &mut Fourier, sums: &mut [[f64; 2]]) {
-    let turns = capture.turns;
+    let turns = &capture.turns;
     let count = turns.count();
     let first = turns.numbers[0];
     let mean = (0..count).map(|turn| turns.at(turn, order, channel)).sum::<Complex64>() / count as f64;

@@ -33,7 +33,7 @@ pub(crate) fn say(diagnosis: &mut Diagnosis, shared: &Shared, stations: &[Statio
         let before = said.iter().filter(|known| **known == sensor).count();
         said.push(sensor);
         let is = |line: &&Line| line.row().0 == sensor;
-        let known = shared.data.iter().find_map(|station| station.seen.lines.iter().filter(is).nth(before));
+        let known = shared.data.iter().find_map(|station| station.seen.lines.found.iter().filter(is).nth(before));
         let Some(line) = known else { continue };
         added.parameters = line.parameters();
         if let Source::Sensors { channels, motion } = &line.source {
@@ -69,13 +69,15 @@ impl Line {
                 parameters.push(said("amplitude", amplitude_um, std, "um"));
             }
             Source::Motion { .. } => {
-                parameters.push(said("amplitude", self.amplitude_um, self.amplitude_std, "um"));
-                parameters.push(said(
-                    "direction",
-                    self.direction_rad.to_degrees(),
-                    self.direction_std.to_degrees(),
-                    "deg",
-                ));
+                let orbit = &self.orbit;
+                parameters.push(said("amplitude", orbit.amplitude_um, orbit.std_um, "um"));
+                if orbit.is_open() {
+                    parameters.push(said("amplitude-across", orbit.across_um, orbit.std_um, "um"));
+                }
+                if orbit.has_direction() {
+                    let [direction_deg, std_deg] = [orbit.direction_rad, orbit.direction_std_rad].map(f64::to_degrees);
+                    parameters.push(said("direction", direction_deg, std_deg, "deg"));
+                }
             }
         }
         parameters

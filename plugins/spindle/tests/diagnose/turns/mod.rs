@@ -22,6 +22,57 @@ fn an_asynchronous_line_is_found_in_the_turns() {
     }
 }
 
+/// Several lines at once: as large as each other, small beside large, and such as turns see at the same phase. All are found, as large as
+/// they are, and noise is what a campaign without lines has.
+#[test]
+fn all_of_several_lines_are_found() {
+    let quiet = |seed: u64, lines: &[(f64, f64)]| {
+        let each = lines.iter().enumerate().map(|(index, (order, amplitude_um))| {
+            let direction_deg = 20 + 50 * index;
+            format!(
+                r#"{{"plugin":"asynchronous-line","order":{order},"amplitude_um":{amplitude_um},"direction_deg":{direction_deg}}}"#
+            )
+        });
+        let mut config = campaign(seed, &format!("[{}]", each.collect::<Vec<_>>().join(",")));
+        config.asynchronous.rms_um = None;
+        config
+    };
+    let level = |seed: u64, lines: &[(f64, f64)]| diagnosed(&quiet(seed, lines)).0.diagnosis;
+    let mut pulls = Vec::new();
+    for (seed, lines) in [
+        (1, &[(6.884, 0.1), (3.585, 0.1), (5.415, 0.1)][..]),
+        (2, &[(2.43, 1.28), (7.31, 0.1)]),
+        (3, &[(3.415, 0.4), (5.415, 0.1), (8.415, 0.02)]),
+        (4, &[(0.43, 3.0), (9.21, 0.3), (4.873, 0.03), (12.64, 0.02)]),
+        (5, &[(2.51, 0.2), (2.56, 0.2)]),
+    ] {
+        let (with, without) = (level(seed, lines), level(seed, &[]));
+        let value = |added: &Added, name: &str| added.parameters.iter().find(|one| one.name == name).cloned();
+        let found: Vec<String> = with.added.iter().map(|added| format!("{:?}", value(added, "order"))).collect();
+        let expected = [&with, &without].map(|one| one.after.noise_floor_um.unwrap());
+        println!("simulated, lines {lines:?}: noise {expected:.5?} µm, {found:?}");
+        assert_eq!((with.verdict, with.added.len()), (Verdict::Explained, lines.len()), "{lines:?}: {:?}", with.added);
+        for (index, (order, amplitude_um)) in lines.iter().enumerate() {
+            let is = |added: &&Added| value(added, "order").is_some_and(|one| (one.value - order).abs() < 0.01);
+            let added = with.added.iter().find(is).unwrap();
+            assert_eq!(added.effect, "asynchronous-line");
+            let truths = [("order", *order), ("amplitude", *amplitude_um), ("direction", 20.0 + 50.0 * index as f64)];
+            pulls.extend(truths.map(|(name, truth)| {
+                let found = value(added, name).unwrap();
+                (found.value - truth) / found.std.unwrap()
+            }));
+        }
+        // Noise of some ten readings' residuals at 60 orders is known to some percent.
+        assert!((expected[0] / expected[1] - 1.0).abs() < 0.15, "{expected:?}");
+        let rms = [&with, &without].map(|one| one.after.residual_rms_um);
+        assert!((rms[0] / rms[1] - 1.0).abs() < 0.15, "{rms:?}");
+    }
+    let rms = (pulls.iter().map(|pull| pull * pull).sum::<f64>() / pulls.len() as f64).sqrt();
+    println!("simulated, several lines: errors are {rms:.2} of their stated uncertainty: {pulls:.1?}");
+    // Of some forty values: an uncertainty that is twice too small or too large fails.
+    assert!((0.6..1.6).contains(&rms) && pulls.iter().all(|pull| pull.abs() < 5.0), "{rms}: {pulls:?}");
+}
+
 /// Of two lines, the one at the published order of a bearing's outer ring has its name; the other one fits nothing.
 #[test]
 fn a_line_that_fits_a_bearing_has_its_name() {
