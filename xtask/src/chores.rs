@@ -3,6 +3,7 @@
 use std::{collections::BTreeSet, fs, path::Path, process::Command, time::SystemTime};
 
 use crate::{
+    clock::Clock,
     foreign::{self, Readers},
     fuzz, house, kill_test,
     process::{Outcome, answer, root, run, say, target},
@@ -14,6 +15,7 @@ use crate::{
 /// Picture of the crates, format, lints, tests, and the demo with the program that the tests were built with. With `complete`
 /// files are also read by foreign readers, and a skipped test is a failure.
 pub(crate) fn test(foreign_readers: bool, complete: bool) -> Outcome {
+    let mut clock = Clock::start();
     house::check_quietly()?;
     setup::components()?;
     run(&mut cargo(&["fmt", "--all", "--check"])?)?;
@@ -38,6 +40,7 @@ pub(crate) fn test(foreign_readers: bool, complete: bool) -> Outcome {
         let readers = readers.map(|thread| thread.join().map_err(|_| "the packages could not be installed".to_owned()));
         readers.transpose()?.transpose()
     })?;
+    clock.over("compile and lint");
     let mut tests = linting(runner)?;
     tests.arg("--no-fail-fast");
     // Foreign readers that one test starts inherit the open files of the others, and HDF5's locks on them with it.
@@ -49,7 +52,9 @@ pub(crate) fn test(foreign_readers: bool, complete: bool) -> Outcome {
         readers.equip(&mut tests);
     }
     run(&mut tests)?;
+    clock.over("tests");
     run(&mut linting(&["test", "--workspace", "--doc", "--quiet"])?)?;
+    clock.over("examples of the docs");
     let program = target().join("debug/runout");
     run_example(&program)?;
     let package = || if foreign_readers { python::test() } else { Ok(()) };
@@ -66,6 +71,8 @@ pub(crate) fn test(foreign_readers: bool, complete: bool) -> Outcome {
     } else {
         package()?;
     }
+    clock.over(if complete { "fuzzing, kills and the Python package" } else { "the Python package" });
+    say(&clock.text());
     if !foreign_readers {
         say(
             "the tests of the Python package were skipped: they need packages of Python's (`cargo xtask test --ci` installs them)",

@@ -5,6 +5,7 @@ mod bench;
 mod bench_batch;
 mod bench_diagnose;
 mod chores;
+mod clock;
 #[cfg(any(test, feature = "data"))]
 mod data;
 mod foreign;

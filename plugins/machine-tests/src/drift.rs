@@ -7,8 +7,9 @@
 //! | `stable-after` | time from which on an axis stays within `stable_um` of where it is in the last tenth of the test |
 //!
 //! Range and combination are those of a maker of spindle analysers (Lion Precision, *SpindleCheck*, manual M017-7500.004, page 29, which names
-//! ISO 230-3); the criterion of stability is this program's. Displacements are means over `window_s`. Their noise is what most second differences
-//! of neighbouring means show, which a slow drift has not, nor a few steps.
+//! ISO 230-3); the criterion of stability is this program's. Displacements are means over `window_s`, without
+//! single readings that are far from the others. Their noise is what most second differences of neighbouring means show, which a slow drift
+//! has not, nor a few steps.
 //!
 //! # The interval of a range
 //!
@@ -33,7 +34,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use crate::draws::Draw;
-use course::{OF_SECOND_DIFFERENCES, noise_of, range, smoothed, stable_after};
+use course::{OF_SECOND_DIFFERENCES, levels, noise_of, range, smoothed, stable_after};
 
 /// Means that a test has at least: fewer show neither their noise nor a course.
 const FEWEST_MEANS: usize = 20;
@@ -167,6 +168,12 @@ impl Drift {
             values.push(Value { of, uncertainty, ..Value::new(symbol, value, f64::NAN, "um", about) }.key());
         }
         for axis in &test.axes {
+            remarks.extend((axis.left_out > 0).then(|| {
+                format!(
+                    "{} of the readings of {} are far from the others of their window: left out",
+                    axis.left_out, axis.name
+                )
+            }));
             remarks.extend(axis.alone(&test.times_min));
             values.extend(self.stability(test, axis, remarks));
         }
@@ -215,6 +222,8 @@ struct Axis {
     means: Vec<f64>,
     smooth: Vec<f64>,
     noise_um: f64,
+    /// Readings that are far from the others of their window.
+    left_out: usize,
 }
 
 impl Axis {
@@ -284,31 +293,29 @@ impl Test {
             let problem = format!("{filled} means over {window_s} s, expected at least {FEWEST_MEANS}");
             return Err(refuse(problem, "record for longer, or state a shorter `window_s`"));
         }
-        let means = |column: &[f64]| -> Vec<f64> {
+        let windows = |column: &[f64]| -> (Vec<f64>, usize) {
             let mut rest = column;
-            let mut means = Vec::with_capacity(blocks.len());
+            let mut windows = Vec::with_capacity(blocks.len());
             for block in &blocks {
                 let (own, after) = rest.split_at(block.len());
-                if is_filled(block) {
-                    means.push(own.iter().sum::<f64>() / own.len() as f64);
-                }
+                windows.extend(is_filled(block).then_some(own));
                 rest = after;
             }
-            means
+            levels(&windows)
         };
         let axes: Vec<Axis> = AXES
             .iter()
             .filter_map(|(column, name)| {
-                let means = means(points.column(column).ok()?);
-                Some(Axis { name, smooth: smoothed(&means, BESIDE), noise_um: noise_of(&means), means })
+                let (means, left_out) = windows(points.column(column).ok()?);
+                Some(Axis { name, smooth: smoothed(&means, BESIDE), noise_um: noise_of(&means), means, left_out })
             })
             .collect();
         if axes.is_empty() {
             let known = AXES.map(|(column, _)| column).join(", ");
             return Err(refuse(format!("it has none of {known}"), "name the columns of displacements so in [load]"));
         }
-        let times_min = means(times_s).into_iter().map(|time_s| (time_s - start_s) / 60.0).collect();
-        let temperatures = points.column(TEMPERATURE).ok().map(means);
+        let times_min = windows(times_s).0.into_iter().map(|time_s| (time_s - start_s) / 60.0).collect();
+        let temperatures = points.column(TEMPERATURE).ok().map(|column| windows(column).0);
         let all = usize::try_from(all).unwrap_or_default();
         Ok(Self { times_min, axes, temperatures, empty: [all.saturating_sub(filled), all] })
     }

@@ -1,11 +1,34 @@
 //! A course of means over windows: range, noise, and when it comes to rest.
 
+use runout_core::numerics::statistics::{median, median_absolute_deviation};
+
 /// Share of the test at its end that says where an axis is.
 const END: f64 = 0.1;
 /// Median of the distance of normal numbers from 0, in standard deviations.
 const NORMAL_MEDIAN: f64 = 0.674_489_75;
 /// What a mean of second differences has of the variance of single means: 1 + 1/4 + 1/4.
 pub(super) const OF_SECOND_DIFFERENCES: f64 = 1.5;
+
+/// Readings so many standard deviations from the median of their window are no part of its course.
+const FAR: f64 = 7.0;
+
+/// Means of windows, and how many readings are left out of them since they are far from the others, by the spread of their own window and of
+/// the usual one.
+pub(super) fn levels(windows: &[&[f64]]) -> (Vec<f64>, usize) {
+    let spreads: Vec<f64> = windows.iter().map(|window| median_absolute_deviation(window) / NORMAL_MEDIAN).collect();
+    let usual = median(spreads.iter().copied());
+    let mut left_out = 0;
+    let level = |(window, spread): (&&[f64], &f64)| {
+        let (center, far) = (median(window.iter().copied()), FAR * spread.max(usual));
+        // Where most are equal, as of a coarse resolution, nothing says what is far.
+        let kept: Vec<f64> =
+            window.iter().copied().filter(|reading| far <= 0.0 || (reading - center).abs() <= far).collect();
+        left_out += window.len() - kept.len();
+        kept.iter().sum::<f64>() / kept.len() as f64
+    };
+    let means = windows.iter().zip(&spreads).map(level).collect();
+    (means, left_out)
+}
 
 /// Highest less lowest.
 pub(super) fn range(course: &[f64]) -> f64 {
