@@ -130,6 +130,14 @@ fn against_speed(page: &mut Page, report: &BatchReport) {
     if more > 0 {
         page.line(format_args!("  … and {more} more in the table speed"));
     }
+    let without: Vec<&str> = report.without_speed.iter().take(SHOWN).map(String::as_str).collect();
+    if !without.is_empty() {
+        let dots = if report.without_speed.len() > SHOWN { ", …" } else { "" };
+        page.line(format_args!(
+            "  Speed not known, so in no row: {}{dots} (a sampling rate is needed: `sample_rate_hz`)",
+            without.join(", ")
+        ));
+    }
 }
 
 fn place(signals: &Signals) -> String {

@@ -40,9 +40,15 @@ pub(crate) fn page(comparison: &Comparison) -> Page {
     let differences = differences(comparison);
     if !differences.is_empty() {
         page.headed_table(format_args!("Differences from {}{several}", comparison.reference), &differences);
-        page.line("  expected: from the noise measured over the turns, with what both methods have in common");
-        page.line("  E_n = |difference| / (2 × its standard uncertainty), order by order: scatter alone keeps it");
-        page.line("  at or below 1 at 98.2 % of the orders");
+        let quantities = || comparison.stations.iter().flat_map(|station| &station.quantities);
+        let has = |shown: fn(&Difference) -> bool| quantities().flat_map(|one| &one.differences).any(shown);
+        if has(|one| one.expected_rms.is_some()) {
+            page.line("  expected: from the noise measured over the turns, with what both methods have in common");
+        }
+        if has(|one| one.share_within.is_some() || one.worst.is_some()) {
+            page.line("  E_n = |difference| / (2 × its standard uncertainty), order by order: scatter alone keeps it");
+            page.line("  at or below 1 at 98.2 % of the orders");
+        }
     }
     page.bullets("Not compared", &not_compared(comparison));
     let refused: Vec<String> =

@@ -3,6 +3,7 @@
 
 mod batch;
 mod channels;
+mod chromium;
 mod commands;
 mod compare;
 mod diagnosed;
@@ -18,6 +19,7 @@ mod odd_files;
 mod one_line;
 mod other_rigs;
 mod points;
+mod print;
 mod put_right;
 mod reading;
 mod remarks;

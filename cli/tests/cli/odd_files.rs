@@ -109,3 +109,21 @@ fn diagnose_asks_for_the_memory_that_it_needs() {
     assert_eq!(folder.run(&["diagnose", "pipeline.toml", "--memory", "0"]).status, 2);
     assert_eq!(folder.run(&["diagnose", "pipeline.toml", "--memory", "1"]).status, 0);
 }
+
+/// HDF5 locks a file that it writes to: another program's lock is no damage.
+#[test]
+#[cfg(target_os = "linux")]
+fn a_recording_that_another_program_holds_open_is_not_called_damaged() {
+    let folder = Folder::with(&[("pipeline.toml", &pipeline())]);
+    let path = folder.path().join("shaft.h5");
+    drop(hdf5_metno::File::create(&path).unwrap());
+    let held = fs::File::options().read(true).write(true).open(&path).unwrap();
+    held.lock().unwrap();
+    let mut command = assert_cmd::cargo::cargo_bin_cmd!("runout");
+    command.args(["run", "pipeline.toml"]).env("HDF5_USE_FILE_LOCKING", "TRUE").current_dir(folder.path());
+    let output = command.output().unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(said.contains("another program holds the file open") && said.contains("HDF5_USE_FILE_LOCKING"), "{said}");
+    assert!(!said.contains("damaged"), "{said}");
+}

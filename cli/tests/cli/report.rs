@@ -3,12 +3,14 @@
 use std::{
     fs,
     path::{Path, PathBuf},
-    process::Command,
 };
 
-use crate::folder::{self, Folder};
+use crate::{
+    chromium::{in_chromium, say},
+    folder::{self, Folder},
+};
 
-const SCENARIO: &str = r#"
+pub(crate) const SCENARIO: &str = r#"
 plugin = "spindle"
 output = "shaft.h5"
 seed = 3
@@ -27,7 +29,7 @@ max_order = 12
 rms_um = 0.02
 "#;
 
-const EXPORT: &str = "\n[[export]]\nplugin = \"report\"\npath = \"out/report.html\"\n\n[[export]]\nplugin = \"hdf5\"\npath = \"out/result.h5\"\n";
+pub(crate) const EXPORT: &str = "\n[[export]]\nplugin = \"report\"\npath = \"out/report.html\"\n\n[[export]]\nplugin = \"hdf5\"\npath = \"out/result.h5\"\n";
 
 /// A name that a page could stumble over, as TOML writes it.
 const HOSTILE: &str = r#""</script><b>\"'&amp; <!-- %{y} \u05e9\u05dc\u05d5\u05dd Prüf\nling""#;
@@ -247,40 +249,9 @@ fn what_is_no_result_is_refused() {
     assert!(!folder.path().join("shaft.html").exists(), "a half report");
 }
 
-#[allow(clippy::print_stderr, reason = "a skipped test, sizes and times are worth a line")]
-fn say(text: &str) {
-    eprintln!("{text}");
-}
-
-/// Chromium and the modules that drive it; nothing, with the reason printed, where they are missing.
-fn browser() -> Option<(PathBuf, String)> {
-    let here = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/browser");
-    let modules = std::env::var_os("RUNOUT_NODE_MODULES").map_or_else(|| here.join("node_modules"), PathBuf::from);
-    let chromium = std::env::var("RUNOUT_CHROMIUM").unwrap_or_else(|_| "chromium".into());
-    let missing = if !modules.join("puppeteer-core").is_dir() || !modules.join("axe-core").is_dir() {
-        "puppeteer-core and axe-core are not installed in RUNOUT_NODE_MODULES"
-    } else if Command::new(&chromium).arg("--version").output().is_err() {
-        "Chromium is not installed (RUNOUT_CHROMIUM names it)"
-    } else {
-        return Some((modules, chromium));
-    };
-    assert!(std::env::var_os("RUNOUT_REQUIRE_FOREIGN").is_none_or(|value| value != "1"), "{missing}");
-    say(&format!("skipped: {missing}"));
-    None
-}
-
 /// What Chromium finds in a report.
 fn look(report: &Path) -> Option<serde_json::Value> {
-    let (modules, chromium) = browser()?;
-    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/browser/look.mjs");
-    // The program is named as a path: the browser is not looked up by puppeteer.
-    let chromium = std::env::split_paths(&std::env::var_os("PATH").unwrap_or_default())
-        .map(|folder| folder.join(&chromium))
-        .find(|path| path.is_file())
-        .unwrap_or_else(|| PathBuf::from(chromium));
-    let output = Command::new("node").arg(script).arg(modules).arg(chromium).arg(report).output().unwrap();
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    Some(serde_json::from_slice(&output.stdout).unwrap())
+    in_chromium("look.mjs", report)
 }
 
 /// No console message, no request, nothing serious for people who do not see the page; sizes and times are printed.

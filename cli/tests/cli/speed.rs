@@ -80,7 +80,11 @@ fn twelve_speeds_give_values_over_rpm_and_the_shift_of_the_axis() {
     for (name, speed) in names.iter().zip(&speeds) {
         fs::write(folder.path().join(name), recording(*speed)).unwrap();
     }
-    let recordings: Vec<&str> = names.iter().map(String::as_str).collect();
+    // One without a clock has no speed.
+    let timeless: String =
+        recording(700.0).lines().map(|line| line.split_once(',').unwrap().1.to_owned() + "\n").collect();
+    fs::write(folder.path().join("timeless.csv"), timeless).unwrap();
+    let recordings: Vec<&str> = names.iter().map(String::as_str).chain(["timeless.csv"]).collect();
     let words = |more: &[&'static str]| [&["batch", "pipeline.toml", "--out", "out"], more, &recordings[..]].concat();
     let ran = folder.run(&words(&["--json"]));
     assert_eq!(ran.status, 0, "{}", ran.stderr);
@@ -113,11 +117,16 @@ fn twelve_speeds_give_values_over_rpm_and_the_shift_of_the_axis() {
         assert!(at(shift, "slowest")[1].abs() < 1e-12, "the slowest is the reference");
     }
     assert!(folder.path().join("out/speed.parquet").is_file());
-    assert!(fs::read_to_string(folder.path().join("out/speed.svg")).unwrap().starts_with("<svg"));
+    // Every series has its panel, though there are more than the panels that stations are thinned to.
+    let series = report["against_speed"].as_array().unwrap().len();
+    let picture = fs::read_to_string(folder.path().join("out/speed.svg")).unwrap();
+    assert!(series > 12 && picture.starts_with("<svg") && !picture.contains(&format!("of {series})")), "{series}");
     assert!(
         fs::read_to_string(folder.path().join("out/report.html")).unwrap().contains("Error motion against the speed")
     );
+    assert_eq!(report["without_speed"], serde_json::json!(["timeless"]));
     let shown = folder.run(&words(&[])).stdout;
+    assert!(shown.contains("Speed not known, so in no row: timeless"), "{shown}");
     println!("{shown}");
     assert!(shown.contains("Error motion against the speed") && shown.contains("axis-shift-x"), "{shown}");
 }

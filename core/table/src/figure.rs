@@ -11,6 +11,9 @@ pub struct Figure {
     pub title: String,
     /// Columns of names that part the rows into panels.
     pub panels: Vec<String>,
+    /// Whether panels are of different quantities, so that a picture with room for fewer still has each.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub every_panel: bool,
     /// Columns of names that part the rows of a panel into curves.
     pub curves: Vec<String>,
     /// A column of names, and the names of the rows that are drawn; without it all rows are.
@@ -167,7 +170,20 @@ impl Figure {
         let (panels, curves) = (Vec::new(), Vec::new());
         let (id, title) = (id.into(), title.into());
         let (lines, named) = (Vec::new(), Vec::new());
-        Self { id, title, panels, curves, only: None, places: None, level: None, lines, named, circles: None, drawing }
+        Self {
+            id,
+            title,
+            panels,
+            every_panel: false,
+            curves,
+            only: None,
+            places: None,
+            level: None,
+            lines,
+            named,
+            circles: None,
+            drawing,
+        }
     }
 
     /// Deviations about a reference circle.
@@ -244,6 +260,12 @@ impl Figure {
     #[must_use]
     pub fn panels<T: Into<String>>(self, columns: impl IntoIterator<Item = T>) -> Self {
         Self { panels: columns.into_iter().map(Into::into).collect(), ..self }
+    }
+
+    /// The same with a panel for each quantity that these columns name, of which none is left out.
+    #[must_use]
+    pub fn quantities<T: Into<String>>(self, columns: impl IntoIterator<Item = T>) -> Self {
+        Self { every_panel: true, ..self.panels(columns) }
     }
 
     /// The same with a curve for each combination of names in these columns.

@@ -142,7 +142,7 @@ pub struct Point {
 }
 
 impl Panels {
-    /// None yet; of more than `most` panels, those at equal distances are kept.
+    /// None yet; of more than `most` panels, those at equal distances are kept, unless they are of different quantities.
     ///
     /// # Errors
     /// When the figure names a column that the table lacks.
@@ -181,7 +181,7 @@ impl Panels {
             known_places: HashSet::new(),
             numbers: HashMap::new(),
             stride: 1,
-            most,
+            most: if figure.every_panel { usize::MAX } else { most },
             panel_columns: figure.panels.clone(),
             curve_columns: figure.curves.clone(),
             only: figure.only.clone(),

@@ -5,7 +5,7 @@ mod vectors;
 use kuva::{
     backend::{png::PngBackend, svg::SvgBackend},
     plot::{
-        ColorMap, Heatmap, LegendPosition, LinePlot, LollipopPlot, ScatterPlot,
+        ColorMap, Heatmap, LegendPosition, LinePlot, LineStyle, LollipopPlot, ScatterPlot,
         polar::{PolarMode, PolarPlot},
     },
     render::{figure::Figure, layout::Layout, plots::Plot, render::render_multiple},
@@ -108,7 +108,7 @@ fn cell(figure: &Panels, panel: &Panel, scale: f64, unit: &str) -> (Vec<Plot>, L
         .collect();
     let level = figure.level.as_ref().map(|level| (level.name.as_str(), scale * level.value));
     let tallest = curves.iter().flat_map(|curve| &curve.points).map(|point| point.y).fold(0.0, f64::max);
-    let lines_over = figure.lines.iter().map(|line| over(line, scale));
+    let lines_over = figure.lines.iter().enumerate().map(|(index, line)| over(line, scale, index));
     let over = lines_over.chain(named(&figure.named, tallest)).collect::<Vec<_>>();
     let (plots, layout) = match figure.kind {
         Kind::Polar => polar(&curves, &axes[1]),
@@ -249,13 +249,13 @@ fn limit((name, value): (&str, f64), curves: &[Curve], highest: f64) -> Plot {
     Plot::Line(LinePlot::new().with_data(line).with_color(LIMIT).with_stroke_width(1.2).with_legend(name))
 }
 
-/// A limit that differs from order to order, as far as orders are shown.
-fn over(line: &Line, scale: f64) -> Plot {
+/// A limit that differs from order to order, as far as orders are shown; several are dashed differently.
+fn over(line: &Line, scale: f64, index: usize) -> Plot {
     let shown = line.points.iter().filter(|point| point[0] <= HIGHEST_ORDER);
     let points = shown.map(|[x, y]| (*x, scale * y)).collect::<Vec<_>>();
-    Plot::Line(
-        LinePlot::new().with_data(points).with_color(LIMIT).with_stroke_width(1.2).with_legend(line.name.clone()),
-    )
+    let plot = LinePlot::new().with_data(points).with_color(LIMIT).with_stroke_width(1.2);
+    let styles = [LineStyle::Dashed, LineStyle::Dotted, LineStyle::DashDot, LineStyle::Solid];
+    Plot::Line(plot.with_line_style(styles[index % styles.len()].clone()).with_legend(line.name.clone()))
 }
 
 /// A line from the bottom to the top at each named place, as far as orders are shown, with its name in the legend.

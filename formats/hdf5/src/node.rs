@@ -89,7 +89,13 @@ pub(crate) fn open(path: &Path, follow_links: bool) -> Result<(File, Place, Arc<
                 .of(ErrorKind::DamagedData)
                 .help("a recording in text is read by [load] plugin = \"csv\"");
         }
-        Error::new("open", &shown, format!("no HDF5 file, or a damaged one: {error}"))
+        let problem = error.to_string();
+        if problem.contains("unable to lock file") {
+            return Error::new("open", &shown, "another program holds the file open for writing").of(ErrorKind::Io).help(
+                "close it there; where it is known to write nothing more, HDF5_USE_FILE_LOCKING=FALSE in the environment opens it all the same",
+            );
+        }
+        Error::new("open", &shown, format!("no HDF5 file, or a damaged one: {problem}"))
             .of(ErrorKind::DamagedData)
             .help("a file whose writing was interrupted is often truncated")
     })?;

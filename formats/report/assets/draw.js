@@ -111,21 +111,41 @@ const Draw = (() => {
     return { shapes: [{ type: "line", xref: "paper", x0: 0, x1: 1, yref: "y", y0: at, y1: at, line, name: plain(name), showlegend: true }], showlegend: true };
   }
 
+  const NAMES_APART = 0.045; // Of the axis: as close as names beside each other are readable on paper.
+  const NAMES_BELOW = 3; // Names below each other, where places are closer.
+
+  // Names of places, from left to right, with the height of each: names of close places are below each other, and of more than fit one text.
+  function laid(places, [from, to]) {
+    const free = Array(NAMES_BELOW).fill(-Infinity);
+    const labels = [];
+    for (const [at, text] of [...places].sort(([one], [other]) => one - other)) {
+      const row = free.findIndex((last) => at - last >= NAMES_APART * (to - from));
+      if (row < 0) labels[labels.length - 1].text += `, ${text}`;
+      else {
+        labels.push({ at, text, y: 1 - row / NAMES_BELOW });
+        free[row] = at;
+      }
+    }
+    return labels;
+  }
+
   // Named places along the horizontal axis: a line from bottom to top, with its name.
   function named(figure, chart) {
     const { faint } = colours();
     const places = figure.named ?? [];
     const line = ([at]) => ({ type: "line", xref: "x", x0: at, x1: at, yref: "paper", y0: 0, y1: 1, line: { color: faint, width: 1, dash: "dot" } });
-    const name = ([at, text]) => ({ x: at, xref: "x", y: 1, yref: "paper", yanchor: "top", xanchor: "right", text: plain(text), textangle: -90, showarrow: false, font: { size: 10, color: faint } });
+    const name = ({ at, text, y }) => ({ x: at, xref: "x", y, yref: "paper", yanchor: "top", xanchor: "right", text: plain(text), textangle: -90, showarrow: false, font: { size: 10, color: faint } });
     if (!places.length) return chart;
-    return { ...chart, shapes: [...(chart.shapes ?? []), ...places.map(line)], annotations: [...(chart.annotations ?? []), ...places.map(name)] };
+    return { ...chart, shapes: [...(chart.shapes ?? []), ...places.map(line)], annotations: [...(chart.annotations ?? []), ...laid(places, chart.xaxis.range).map(name)] };
   }
 
-  // Limits that differ from place to place.
+  const DASHES = ["dash", "dot", "dashdot", "longdash"];
+
+  // Limits that differ from place to place; several are dashed differently.
   function over(figure) {
     const { ink } = colours();
-    return (figure.lines ?? []).map(({ name, x, y }) => ({
-      type: "scatter", mode: "lines", x: numbers(x), y: numbers(y), name: plain(name), line: { color: ink, width: 1.2, dash: "dash" }, meta: "limit", showlegend: true,
+    return (figure.lines ?? []).map(({ name, x, y }, index) => ({
+      type: "scatter", mode: "lines", x: numbers(x), y: numbers(y), name: plain(name), line: { color: ink, width: 1.2, dash: DASHES[index % DASHES.length] }, meta: "limit", showlegend: true,
       hovertemplate: `order %{x}: limit %{y} ${figure.y.unit}<extra></extra>`,
     }));
   }
@@ -305,7 +325,7 @@ const Draw = (() => {
     const side = (axis) => ({ title: { text: label(axis) }, gridcolor: line, zeroline: false, showspikes: false, backgroundcolor: "rgba(0,0,0,0)" });
     const scene = round
       ? { xaxis: side(of.y), yaxis: side({ name: "x", unit: "mm" }), zaxis: side({ name: "y", unit: "mm" }), aspectmode: "data", camera: { eye: { x: 1.25, y: -2.05, z: 1.0 } } }
-      : { xaxis: side(of.x), yaxis: side(of.y), zaxis: side(times === 1 ? of.height : { name: `${of.height.name} × ${times}`, unit: of.height.unit }), aspectmode: "manual", aspectratio: { x: 1.3, y: 1.3, z: 0.4 } };
+      : { xaxis: side(of.x), yaxis: side(of.y), zaxis: side(times === 1 ? of.height : { name: `${of.height.name} × ${times}`, unit: of.height.unit }), aspectmode: "manual", aspectratio: { x: 1.3, y: 1.3, z: 0.4 }, camera: { eye: { x: 1.4, y: 1.4, z: 1.3 }, center: { x: 0, y: 0, z: -0.15 } } };
     const said = rings.length > 1 && rings[1] > 1 ? `one of ${rings[1]} ${round ? "rings" : "rows"} is drawn` : "";
     return { traces: [trace], layout: layout({ scene, height: 460, margin: { l: 0, r: 0, t: 0, b: 0 } }), rings, angles, said };
   }

@@ -17,20 +17,18 @@
     return element("label", {}, text, control);
   }
 
-  // Two charts are beside each other on A4, whose width a browser gives only once it prints.
-  const PAPER = { width: 320, wide: 660, height: 0.7 };
   let printing = false;
 
   // Draws into a place of the chart's own height, and as wide as there is room.
-  function put(place, { traces, layout: { height, ...layout } }) {
-    const high = printing ? PAPER.height * height : height;
-    place.style.height = `${high}px`;
-    // The first figure has the page's width; a map shares it with its body in space.
-    const width = place.closest(".first") && !place.closest(".map") ? PAPER.wide : PAPER.width;
-    // A lower chart has its legend farther below, by shares of its height.
-    const legend = { ...layout.legend, y: layout.polar ? -0.2 : -0.38 };
-    const size = printing ? { autosize: false, width, height: high, legend } : { autosize: true };
-    return Plotly.react(place, traces, { ...layout, ...size }, CONFIG);
+  function put(place, { traces, layout }) {
+    const { height, ...shape } = printing ? Paper.layout(place, traces, layout) : { ...layout, autosize: true };
+    place.style.height = `${height}px`;
+    place.parentNode.querySelector(":scope > .names")?.remove();
+    if (printing) {
+      const names = Paper.legend(traces, layout).map(([name, colour, mark]) => element("span", {}, element("span", { textContent: `${mark} `, style: `color: ${colour}` }), name));
+      if (names.length) place.after(element("p", { className: "names" }, ...names.flatMap((name) => [name, " "])));
+    }
+    return Plotly.react(place, printing ? Paper.traces(traces) : traces, { ...shape, ...(printing ? { height } : {}) }, CONFIG);
   }
 
   // Charts are drawn one after the other, those in view first, so that the page can be used before the last one is there.
@@ -171,7 +169,7 @@
       slider.addEventListener("input", solid);
       // It is drawn too late for print, which takes it as it is, and smaller.
       redraws.push(() => {
-        space.style.zoom = printing ? PAPER.width / space.offsetWidth : "";
+        space.style.zoom = printing ? Paper.widthOf(space) / space.offsetWidth : "";
         return printing || solid();
       });
     });
@@ -181,20 +179,24 @@
     redraws.push(map, () => chosen.row !== null && open(chosen.row));
   }
 
+  const columns = Object.fromEntries(Object.entries(data.values).map(([key, column]) => [key, column.texts ? column.rows.map((row) => column.texts[row]) : column]));
+  const values = columns.shown.map((_, row) => Object.fromEntries(Object.entries(columns).map(([key, column]) => [key, column[row]])));
+
   function table() {
     const body = document.querySelector("#rows tbody");
-    if (!body) return;
+    if (!body) return () => {};
     let most = 50;
-    const columns = Object.fromEntries(Object.entries(data.values).map(([key, column]) => [key, column.texts ? column.rows.map((row) => column.texts[row]) : column]));
-    const values = columns.shown.map((_, row) => Object.fromEntries(Object.entries(columns).map(([key, column]) => [key, column[row]])));
     const [filter, count, all] = ["filter", "shown", "all"].map((id) => document.getElementById(id));
     const keys = ["place", "symbol", "low", "shown", "high", "unit", "interval", "kind", "refers", "note"];
     const numeric = new Set(["low", "shown", "high", "interval"]);
     // What a value is by its standard is a footnote of the rows that are shown: its number is in the row, its text below.
     function footnoted(rows) {
       const texts = [...new Set(rows.map((row) => row.about))];
-      rows.forEach((row) => { row.note = [row.remark.replace(/; $/, ""), `${texts.indexOf(row.about) + 1})`].filter(Boolean).join(" "); });
-      document.getElementById("footnotes").replaceChildren(...texts.map((text) => element("li", { textContent: text })));
+      const many = printing && texts.length > Paper.MOST_NOTES;
+      rows.forEach((row) => { row.note = [row.remark.replace(/; $/, ""), many ? "" : `${texts.indexOf(row.about) + 1})`].filter(Boolean).join(" "); });
+      document.getElementById("footnotes").replaceChildren(...(many ? [] : texts).map((text) => element("li", { textContent: text })));
+      const standards = [...new Set(texts.map((text) => /^ISO[ /A-Z]* [0-9-]+:[0-9]+/.exec(text)?.[0]).filter(Boolean))];
+      document.getElementById("standards").textContent = many ? `By ${standards.join(", ")}; the page has the definition of each value.` : "";
       return rows;
     }
     // Values of one quantity at several stations are one row, which opens.
@@ -213,20 +215,22 @@
       const [first] = group;
       const [low, middle, high] = [0, (known.length - 1) >> 1, known.length - 1].map((place) => known[place]);
       const remark = group.some((row) => row.remark.includes("! ")) ? "! refuted at some" : "";
-      const several = ["stations", "sections"].includes(first.group) ? `${group.length} ${first.group}` : `${first.group}, ${group.length} stations`;
+      const places = new Set(group.map((row) => row.place)).size;
+      const many = places < group.length ? `, ${group.length} values` : "";
+      const several = ["stations", "sections"].includes(first.group) ? `${places} ${first.group}${many}` : `${first.group}, ${places} stations${many}`;
       const head = { ...first, key, place: several, low: low.shown, shown: middle.shown, high: high.shown, interval: "", kind: "", remark, value: middle.value };
       return open.has(key) ? [head, ...group] : [head];
     }
-    const show = () => {
+    const show = (kept = () => true) => {
       const words = filter.value.toLowerCase().split(/\s+/).filter(Boolean);
-      rows = values.filter(matches(words));
-      const listed = words.length || sorted ? [...rows] : [...groups].flatMap(([key, group]) => gathered(key, group));
+      rows = values.filter(matches(words)).filter(kept);
+      const listed = words.length || sorted ? [...rows] : [...groups].filter(([, group]) => kept(group[0])).flatMap(([key, group]) => gathered(key, group));
       if (sorted) {
         const [key, sign] = [sorted, down ? -1 : 1];
         listed.sort((a, b) => sign * (key === "value" ? (a.value ?? Infinity) - (b.value ?? Infinity) : String(a[key] ?? "").localeCompare(String(b[key] ?? ""), "en", { numeric: true })));
       }
       const cell = (row, key) => {
-        const names = [numeric.has(key) ? "number" : "", key === "low" || key === "high" ? "several" : ""];
+        const names = [numeric.has(key) ? "number" : "", key === "low" || key === "high" ? "several" : "", key === "note" && row.remark ? "remark" : ""];
         const made = element("td", { className: names.join(" ").trim() });
         if (key === "place" && row.key) {
           const toggle = () => { open.has(row.key) ? open.delete(row.key) : open.add(row.key); show(); };
@@ -237,9 +241,10 @@
       body.replaceChildren(...footnoted(listed.slice(0, most)).map((row) => element("tr", {}, ...keys.map((key) => cell(row, key)))));
       document.getElementById("rows").classList.toggle("single", listed.every((row) => row.low === undefined));
       all.hidden = listed.length <= most;
+      document.getElementById("left").textContent = listed.length > most ? `${listed.length - most} of ${listed.length} rows are left out on paper: the page and the result's table "values" have them.` : "";
       count.textContent = listed.length > most ? `the first ${most} of ${listed.length} rows` : `${rows.length} values`;
     };
-    filter.addEventListener("input", show);
+    filter.addEventListener("input", () => show());
     all.addEventListener("click", () => { most = Infinity; show(); });
     document.querySelectorAll("#rows th button").forEach((button) => button.addEventListener("click", () => {
       down = sorted === button.dataset.key && !down;
@@ -260,22 +265,93 @@
       area.remove();
       count.textContent = `${rows.length} values copied`;
     });
-    // On paper nothing is left out.
-    let onScreen = most;
-    addEventListener("beforeprint", () => { [onScreen, most] = [most, Infinity]; show(); });
-    addEventListener("afterprint", () => { most = onScreen; show(); });
     show();
+    // On paper a page of rows; those of stations with a sheet each are there.
+    return () => {
+      const kept = most;
+      const inSheets = new Set(printing ? Paper.stations(data.figures) : []);
+      if (printing) most = Paper.MOST_ROWS;
+      show((row) => !inSheets.has(row.station));
+      most = kept;
+    };
+  }
+
+  // A station's values: those of its sections in a table with a column for each section, and those of the station.
+  function stationValues(station) {
+    const own = values.filter((row) => row.station === station);
+    const parts = [own.filter(({ section }) => section), own.filter(({ section }) => !section)].filter((rows) => rows.length);
+    return element("div", { className: "columns" }, ...parts.map(valuesBySection));
+  }
+
+  // A row for each symbol and reference, below a line that says the filter.
+  function valuesBySection(own) {
+    const sections = [...new Set(own.map(({ section }) => section))];
+    const groups = new Map();
+    own.forEach((row) => {
+      const [reference, filter] = [row.refers.split(", ").slice(0, -1).join(", "), row.refers.split(", ").pop()];
+      const group = groups.get(filter) ?? groups.set(filter, new Map()).get(filter);
+      const key = JSON.stringify([row.symbol, reference, row.unit]);
+      const cells = group.get(key) ?? group.set(key, { name: [row.symbol, reference].filter(Boolean).join(" "), unit: row.unit, of: sections.map(() => []) }).get(key);
+      cells.of[sections.indexOf(row.section)].push(row);
+    });
+    const cell = (list) => (list.length > 1 ? `${list.length} values` : list[0]?.shown ?? "");
+    const cells = (kind, row) => row.map((text, column) => element(kind, { textContent: text, className: column > 1 ? "number" : "" }));
+    const head = element("thead", {}, element("tr", {}, ...cells("th", ["value", "unit", ...sections.map((name) => name || "value ± std")])));
+    const body = [...groups].flatMap(([filter, group]) => [
+      ...(groups.size > 1 ? [element("tr", {}, element("th", { textContent: `filter: ${filter || "none"}`, colSpan: 2 + sections.length }))] : []),
+      ...[...group.values()].map(({ name, unit, of }) => element("tr", {}, ...cells("td", [name, unit, ...of.map(cell)]))),
+    ]);
+    return element("table", {}, head, element("tbody", {}, ...body));
+  }
+
+  // Sheets of the stations, made when the page is printed and taken away after it.
+  function sheets() {
+    const names = Paper.stations(data.figures);
+    const figures = Paper.ofStations(data.figures, names);
+    const next = document.getElementById("figures");
+    return names.map((name, index) => {
+      const charts = element("div", { className: "charts" });
+      const section = element("section", { className: "sheet-of-station" }, element("h2", { textContent: name, dir: "auto" }), charts, stationValues(name));
+      next.before(section);
+      figures.forEach((figure, place) => {
+        const plot = element("div", { className: "plot" });
+        const readout = element("p", { className: "readout" });
+        charts.append(element("figure", { className: place ? "" : "large" }, element("figcaption", {}, element("h3", { textContent: figure.title })), plot, readout));
+        const drawn = Draw[figure.kind](figure, figure.panels[index], {});
+        put(plot, drawn);
+        readout.textContent = [drawn.said, drawn.magnification?.(plot)].filter(Boolean).join("; ");
+        if (drawn.table) charts.lastChild.append(element("div", { className: "sheet" }, written(drawn.table)));
+      });
+      return section;
+    });
   }
 
   const redraw = () => redraws.forEach((one) => one());
   document.querySelectorAll("[data-figure]").forEach((box) => chart(data.figures[Number(box.dataset.figure)], box.querySelector(".drawn")));
   if (data.surface) surface(data.surface, document.querySelector('[data-map="surface"]'), "surface");
-  table();
+  const tabulate = table();
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
-  // Print has its own colours and width.
-  for (const moment of ["beforeprint", "afterprint"]) {
-    addEventListener(moment, () => { printing = moment === "beforeprint"; redraw(); });
-  }
+  // Print has its own colours and sizes, and a sheet for each of a few stations in place of the figures that one chooses from.
+  const ofSheets = new Set(Paper.ofStations(data.figures, Paper.stations(data.figures)));
+  const charts = [...document.querySelectorAll("#figures [data-figure]")];
+  charts.forEach((box) => box.classList.toggle("by-station", ofSheets.has(data.figures[Number(box.dataset.figure)])));
+  charts[0]?.parentNode.classList.toggle("few", charts.filter((box) => !box.classList.contains("by-station")).length <= Paper.FEW);
+  const folded = document.querySelectorAll("#provenance details:not([open])");
+  let onPaper = [];
+  addEventListener("beforeprint", () => {
+    printing = true;
+    redraw();
+    tabulate();
+    onPaper = sheets();
+    folded.forEach((one) => { one.open = true; });
+  });
+  addEventListener("afterprint", () => {
+    printing = false;
+    onPaper.forEach((sheet) => sheet.remove());
+    folded.forEach((one) => { one.open = false; });
+    redraw();
+    tabulate();
+  });
   document.documentElement.dataset.ready = "true";
   drawAll();
 })();

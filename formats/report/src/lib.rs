@@ -125,6 +125,11 @@ fn symbol(unit: &str) -> String {
     match unit {
         "1" => String::new(),
         "deg" => "°".into(),
-        _ => unit.replace("um", "µm").replace("urad", "µrad").replace("/deg", "/°"),
+        _ => unit
+            .replace("um", "µm")
+            .replace("urad", "µrad")
+            .replace("/deg", "/°")
+            .replace("m2", "m²")
+            .replace("m3", "m³"),
     }
 }

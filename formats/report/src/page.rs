@@ -15,7 +15,7 @@ use crate::{
 /// Charts: see `assets/plotly/README.md`.
 const CHARTS: &str = include_str!("../assets/plotly/plotly.min.js");
 const CANVAS: &str = include_str!("../assets/canvas.js");
-const PROGRAM: &str = include_str!("../assets/report.js");
+const PROGRAM: &str = concat!(include_str!("../assets/print.js"), include_str!("../assets/report.js"));
 const DRAWING: &str = concat!(
     include_str!("../assets/draw.js"),
     include_str!("../assets/polar.js"),
@@ -134,6 +134,8 @@ fn table(count: usize) -> Markup {
                 }
             }
             p.note.hint { "A row of several stations or sections opens by a click." }
+            p #left.note.paper {}
+            p #standards.note.paper {}
             ol #footnotes.note {}
         }
     }

@@ -16,6 +16,9 @@ use crate::{one_line, symbol};
 struct Row {
     /// Station and section, or what it is of.
     place: String,
+    /// What of these belongs to a station's own sheet, and where in it.
+    station: String,
+    section: String,
     symbol: String,
     /// The number as it is shown, with its standard uncertainty.
     shown: String,
@@ -41,6 +44,8 @@ struct Row {
 #[derive(Debug, Default, Serialize)]
 pub(crate) struct Columns {
     place: Column,
+    station: Column,
+    section: Column,
     symbol: Column,
     shown: Vec<String>,
     value: Vec<Option<f64>>,
@@ -80,6 +85,8 @@ impl Columns {
         let mut all = Self::default();
         for row in rows(summary) {
             all.place.add(row.place);
+            all.station.add(row.station);
+            all.section.add(row.section);
             all.symbol.add(row.symbol);
             all.shown.push(row.shown);
             all.value.push(row.value);
@@ -122,6 +129,8 @@ fn row(placed: PlacedValue) -> Row {
     let shown = value.number().map_or_else(|| "not observable".into(), |number| with_std(number, value.std()));
     Row {
         place: one_line(&place),
+        station: one_line(placed.station.unwrap_or_default()),
+        section: one_line(&placed.part().unwrap_or_default()),
         symbol: value.symbol.clone(),
         shown: shown + mark(value.refuted_by.as_ref()),
         value: value.number(),

@@ -12,10 +12,12 @@ pub(crate) fn page(mut page: Page, comparison: &Comparison) -> Page {
     let differences = differences(comparison);
     if !differences.is_empty() {
         page.headed_table(format_args!("Differences from {}", comparison.reference), &differences);
-        page.line("  E_n = |difference| / (2 √(u² + u²)), with both standard uncertainties u as of independent results: the methods");
-        page.line(
-            "  share readings, so that scatter alone keeps it below 1; more is an error of one of the two models",
-        );
+        if comparison.values.iter().flat_map(|value| &value.differences).any(|one| one.e_n.is_some()) {
+            page.line("  E_n = |difference| / (2 √(u² + u²)), with both standard uncertainties u as of independent results: the methods");
+            page.line(
+                "  share readings, so that scatter alone keeps it below 1; more is an error of one of the two models",
+            );
+        }
     }
     let columns = columns(comparison);
     if !columns.is_empty() {

@@ -170,7 +170,7 @@ impl<'a> Batch<'a> {
         let (mut complete, mut speeds, mut given) = (Vec::new(), Vec::new(), HashSet::new());
         for (recording, outcome) in recordings.iter().zip(outcomes) {
             given.insert(recording.name.as_str());
-            let mut found = match outcome {
+            let found = match outcome {
                 Outcome::Done(found) => {
                     report.done += 1;
                     found
@@ -184,15 +184,15 @@ impl<'a> Batch<'a> {
                     continue;
                 }
             };
-            speeds.extend(found.at_speed.take());
+            speeds.extend(found.speed());
             report.count(&recording.name, found);
             complete.push(recording.name.clone());
         }
         for name in kept.into_iter().filter(|name| !given.contains(name.as_str())) {
             match self.summary(&name).filter(|summary| self.is_of_configuration(summary)) {
                 Some(summary) => {
-                    let mut found = Found::of(&name, &summary);
-                    speeds.extend(found.at_speed.take());
+                    let found = Found::of(&name, &summary);
+                    speeds.extend(found.speed());
                     report.count(&name, found);
                     report.earlier += 1;
                     complete.push(name);
@@ -202,7 +202,13 @@ impl<'a> Batch<'a> {
         }
         complete.sort_by(|a, b| by_name(a, b));
         report.other_configuration.sort_by(|a, b| by_name(a, b));
-        self.conclude(&complete, Speeds::of(speeds), report)
+        // Of recordings at one speed, or none that has one, no value against speed is missing.
+        let known = speeds.len();
+        let speeds = Speeds::of(speeds);
+        if known == 0 || (known > 1 && speeds.is_none()) {
+            report.without_speed.clear();
+        }
+        self.conclude(&complete, speeds, report)
     }
 
     fn work(

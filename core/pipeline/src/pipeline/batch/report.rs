@@ -47,6 +47,9 @@ pub struct BatchReport {
     /// Error motion and axis shift over the speeds of the recordings; absent where they have one speed.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub against_speed: Vec<SpeedSeries>,
+    /// Recordings whose speed is not known, beside others in `against_speed`: they state no sampling rate.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub without_speed: Vec<String>,
     /// Files of the whole batch.
     pub outputs: Vec<PathBuf>,
 }
@@ -101,10 +104,15 @@ pub(super) struct Found {
     warnings: usize,
     first: Vec<String>,
     /// Its speed; nothing where that is not known.
-    pub(super) at_speed: Option<AtSpeed>,
+    at_speed: Option<AtSpeed>,
 }
 
 impl Found {
+    /// Its speed, where that is known.
+    pub(super) fn speed(&self) -> Option<AtSpeed> {
+        self.at_speed.clone()
+    }
+
     pub(super) fn of(recording: &str, summary: &Summary) -> Self {
         Self {
             at_speed: AtSpeed::of(recording, summary),
@@ -144,12 +152,16 @@ impl BatchReport {
             limits: pipeline.evaluate.limits().iter().map(count).collect(),
             trend: Vec::new(),
             against_speed: Vec::new(),
+            without_speed: Vec::new(),
             outputs: Vec::new(),
         }
     }
 
     /// Counts what was decided of one recording, and keeps what it warns of.
     pub(super) fn count(&mut self, recording: &str, found: Found) {
+        if found.at_speed.is_none() {
+            self.without_speed.push(recording.to_owned());
+        }
         if found.warnings > 0 {
             self.warned += 1;
             self.warning_count += found.warnings;

@@ -48,7 +48,7 @@ pub(crate) fn table() -> TableSpec {
     .optional()
     .figure(
         Figure::points("speed", "Against the speed", "speed_rpm", [Measure::new("value").with_std("std")])
-            .panels(["series"]),
+            .quantities(["series"]),
     )
 }
 

@@ -48,7 +48,7 @@ pub(crate) fn table() -> TableSpec {
     individuals[0] = individuals[0].clone().with_marks("signals");
     let ranges = measures(&[("moving_range", "moving range"), ("range_mean", "mean"), ("range_limit", "upper limit")]);
     let chart = |id: &str, title: &str, measures: &[Measure]| {
-        Figure::lines(id, title, "number", measures.iter().cloned()).panels(["series"]).places(RECORDING)
+        Figure::lines(id, title, "number", measures.iter().cloned()).quantities(["series"]).places(RECORDING)
     };
     TableSpec::new(
         "trend",
