@@ -1,2 +1,1 @@
-//! Tests that cross crates: the checks that every plugin of a kind passes (`tests/conformance`, which writes
-//! `docs/appendix/plugin-conformance.md`), interrupted runs, memory, separators beside each other.
+//! Tests that cross crates: checks for every plugin of a kind (`tests/conformance`, which writes a page of them), interrupted runs, memory, separators beside each other.

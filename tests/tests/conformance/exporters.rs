@@ -41,7 +41,7 @@ pub(crate) fn test(registry: &Arc<Registry>) -> Kind {
             }
             let exporter = Exported::new(&campaigns, plugin, registry);
             let found = CHECKS.iter().map(|check| match &exporter {
-                Ok(exporter) => exporter.check(check.0).into(),
+                Ok(exporter) => exporter.found(check.0),
                 Err(why) => Found::Fails(why.clone()),
             });
             found.collect()
@@ -54,6 +54,8 @@ struct Exported {
     /// `[[export]]` and what belongs to it.
     text: String,
     folder: PathBuf,
+    /// Checks that do not apply, with the reason.
+    exempt: Table,
 }
 
 type Files = BTreeMap<PathBuf, Vec<u8>>;
@@ -61,6 +63,7 @@ type Files = BTreeMap<PathBuf, Vec<u8>>;
 impl Exported {
     fn new(campaigns: &Table, plugin: &str, registry: &Arc<Registry>) -> Result<Self, String> {
         let mut keys = campaign::campaign_of(campaigns, "export", plugin)?;
+        let exempt = keys.remove("exempt").and_then(|exempt| exempt.as_table().cloned()).unwrap_or_default();
         let of = keys.remove("of").and_then(|of| of.as_str().map(str::to_owned));
         let of = of.unwrap_or_else(|| "four-sensor-reversal".into());
         let mut table = campaign::campaign_of(&campaign::campaigns("separate"), "separate", &of)?;
@@ -76,7 +79,15 @@ impl Exported {
         }
         let campaign = Campaign::new(table, &of, Arc::clone(registry))?;
         let folder = campaign.folder().to_owned();
-        Ok(Self { campaign, text: text.to_string(), folder })
+        Ok(Self { campaign, text: text.to_string(), folder, exempt })
+    }
+
+    fn found(&self, check: &str) -> Found {
+        match (self.exempt.get(check).and_then(Value::as_str), self.check(check)) {
+            (None, found) => found.into(),
+            (Some(_), Ok(())) => Found::Fails("it holds: take away the exemption".into()),
+            (Some(why), Err(_)) => Found::Exempt(why.to_owned()),
+        }
     }
 
     fn check(&self, check: &str) -> Result<(), String> {

@@ -17,8 +17,8 @@ use std::{env, fs, sync::Arc, time::Instant};
 #[test]
 fn every_plugin_does_what_its_kind_must_and_the_page_says_so() {
     let registry = Arc::new(campaign::registry());
-    let kinds =
-        [loaders::test, stages::preprocessors, separators::test, effects::test, exporters::test, stages::simulators];
+    let kinds: [fn(&_) -> table::Kind; 6] =
+        [loaders::test, stages::preprocessors, stages::simulators, exporters::test, effects::test, separators::test];
     let of = |test: fn(&_) -> table::Kind| {
         let (begun, kind) = (Instant::now(), test(&registry));
         println!("{}: {:.1} s", kind.heading, begun.elapsed().as_secs_f64());

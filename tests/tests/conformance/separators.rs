@@ -20,7 +20,7 @@ const SCALE: f64 = 3.0;
 /// Largest relative difference that is rounding, and what an iteration leaves.
 const ROUNDING: f64 = 1e-6;
 /// Relative difference of results that are scaled: what iterations leave, and points off their centre are not linear.
-const SECOND_ORDER: f64 = 1e-4;
+const SECOND_ORDER: f64 = 2e-3;
 /// How far ± of data with twice the noise may be from twice the ±: the fit is not linear in all domains.
 const NOT_LINEAR: f64 = 0.1;
 
@@ -29,7 +29,10 @@ const CHECKS: [Check; 9] = [
     Check("table", "Rows fit the table as it is declared before the run."),
     Check("order", "Rows and stations in reverse order give the same values."),
     Check("lost", "A lost order is no number, whatever the data; an order that is not lost is one."),
-    Check("scale", "Readings times 3 give lengths and small angles times 3, and other values unchanged."),
+    Check(
+        "scale",
+        "Readings times 3 give lengths, small angles and counts times 3, and other values unchanged: to 0.2 %.",
+    ),
     Check(
         "noise",
         "Noise times 2 gives ± times 2, to 10 %: of each coefficient of form and motion, or of the values of points in their median.",
@@ -75,10 +78,7 @@ fn all(campaigns: &Table, plugin: &str, registry: &Arc<runout_core::pipeline::Re
     let unknown = campaign.exempt_checks().find(|name| CHECKS.iter().all(|check| check.0 != name.as_str()));
     assert_eq!(unknown, None, "{plugin} is exempt from a check that there is not");
     let found = CHECKS.iter().map(|check| {
-        let begun = std::time::Instant::now();
-        println!("{plugin} {} begins", check.0);
         let found = one(check.0, &campaign, &usual);
-        println!("{plugin} {}: {found:?} after {:.2} s", check.0, begun.elapsed().as_secs_f64());
         match (campaign.exempt(check.0), found) {
             (None, found) => found,
             (Some(_), Found::Holds) => Found::Fails("it holds: take away the exemption".into()),
@@ -175,7 +175,7 @@ fn scales(one: &[Named], scaled: &[Named]) -> Result<(), String> {
         let factor =
             if ["um", "nm", "urad", "counts"].iter().any(|unit| a.unit.starts_with(unit)) { SCALE } else { 1.0 };
         let off = (b.value - factor * a.value).abs();
-        let floor = if a.unit == "um" { 1e-3 * largest } else { 0.0 };
+        let floor = if a.unit == "um" { 1e-2 * largest } else { 0.0 };
         if (a.value.is_nan() && b.value.is_nan()) || off <= SECOND_ORDER * factor * a.value.abs().max(floor) {
             Ok(())
         } else {
@@ -339,7 +339,6 @@ fn rate(inside: usize, count: usize, independent: f64) -> Result<(), String> {
     }
     let share = inside as f64 / count as f64;
     let least = 0.95 - 3.0 * (0.95 * 0.05 / independent).sqrt();
-    println!("{inside} of {count} inside");
     if share >= least {
         Ok(())
     } else {
