@@ -6,6 +6,7 @@ mod campaign;
 mod changed;
 mod effects;
 mod exporters;
+mod harmonics;
 mod loaders;
 mod made;
 mod separators;

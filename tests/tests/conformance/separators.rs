@@ -5,13 +5,14 @@ use std::{collections::BTreeMap, sync::Arc};
 use runout_core::{
     pipeline::{Pipeline, Route},
     stage::{Loader, Source},
-    table::{Array, Float64Array, RecordBatch, StringArray},
+    table::{Array, Float64Array, RecordBatch},
 };
 use toml::Table;
 
 use crate::{
     campaign::{self, Campaign, Named, Ran},
     changed::{Change, Damage},
+    harmonics::harmonics,
     table::{Check, Found, Kind, on_two_threads},
 };
 
@@ -209,40 +210,6 @@ fn noise_doubles(usual: &Ran, noisy: &Ran) -> Found {
     }
     ratios.retain(|ratio| (ratio / 2.0 - 1.0).abs() > NOT_LINEAR || ratio.is_nan());
     ratios.first().map_or(Found::Holds, |ratio| Found::Fails(format!("a ± is {ratio:.3} times as large")))
-}
-
-/// The rows of a table of harmonics.
-struct Harmonic {
-    quantity: String,
-    section: Option<String>,
-    station: String,
-    order: usize,
-    re: f64,
-    im: f64,
-    std: f64,
-    observable: bool,
-}
-
-fn harmonics(ran: &Ran) -> Vec<Harmonic> {
-    let mut found = Vec::new();
-    for (_, rows) in ran.tables.iter().filter(|(table, _)| table.name == "harmonics") {
-        let column = |name: &str| rows.column_by_name(name).unwrap().as_any();
-        let text = |name: &str| column(name).downcast_ref::<StringArray>().unwrap();
-        let number = |name: &str| column(name).downcast_ref::<Float64Array>().unwrap();
-        let order: &arrow_array::UInt32Array = column("order").downcast_ref().unwrap();
-        let observable: &arrow_array::BooleanArray = column("observable").downcast_ref().unwrap();
-        found.extend((0..rows.num_rows()).map(|row| Harmonic {
-            quantity: text("quantity").value(row).to_owned(),
-            section: text("section").is_valid(row).then(|| text("section").value(row).to_owned()),
-            station: text("station").value(row).to_owned(),
-            order: order.value(row) as usize,
-            re: number("re").value(row),
-            im: number("im").value(row),
-            std: number("std").value(row),
-            observable: observable.value(row),
-        }));
-    }
-    found
 }
 
 /// Lost orders: those that are known before the run are null in it, and at every station, whatever the data.
