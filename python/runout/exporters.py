@@ -41,6 +41,32 @@ class Sdf:
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
+class External:
+    """Files of any format by a program in any language"""
+
+    plugin: ClassVar[str] = "external"
+
+    command: Sequence[str]
+    """The program and its arguments. It runs in the folder of the pipeline; a program whose name has a `/` is a path from there."""
+
+    config: Union[Mapping[str, Any], None] = None
+    """What the program gets as `runout.config`: keys of its own."""
+
+    files: Sequence[str]
+    """Names of the files that the program writes, at least one: `files = ["values.txt"]`."""
+
+    memory_mb: Union[int, None] = None
+    """Most memory that the program may write to, in MB, on Linux; without it, as much as there is."""
+
+    path: str
+    """Folder of the files, relative to the TOML. Made where it is missing."""
+
+    timeout_s: Union[float, None] = None
+    """Longest time for one answer, of one table of one station, in s; the first one includes the start of the program. Default:
+    60.0."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
 class Parquet:
     """The tables of a result, one file each"""
 

@@ -1,4 +1,4 @@
-"""Separators of turns and of points as programs: `serve(MySeparator())` makes one of a class.
+"""Separators of turns and of points and exporters as programs: `serve(MySeparator())` makes one of a class.
 
     class Mine:
         def separate(self, station):
@@ -84,26 +84,53 @@ class PointSeparator(Protocol):
         """The values; and what the fit leaves of each point, in µm, where that is known."""
 
 
-def serve(separator: TurnSeparator | PointSeparator, stdin: Optional[BinaryIO] = None, stdout: Optional[BinaryIO] = None) -> None:
-    """Answers requests on stdin until it ends."""
+class Exporter(Protocol):
+    """Files of a result."""
+
+    def export(self, tables: dict[str, pa.Table], summary: dict[str, Any], files: dict[str, str], config: dict[str, Any]) -> None:
+        """Writes each of `files` (name and path to write to); `summary` is that of `summary.json`."""
+
+
+def serve(separator: TurnSeparator | PointSeparator | Exporter, stdin: Optional[BinaryIO] = None, stdout: Optional[BinaryIO] = None) -> None:
+    """Answers requests on stdin until it ends. Started from a terminal, which sends none, it ends and says how it is tried."""
+    if stdin is None and sys.stdin.isatty():
+        raise SystemExit(f"runout starts this program and sends it tables: try it by `runout plugins test -- python3 {sys.argv[0]}`")
     source, sink = stdin or sys.stdin.buffer, stdout or sys.stdout.buffer
     before, sys.stdout = sys.stdout, sys.stderr
     try:
+        given: dict[str, list[pa.Table]] = {}
         while (tables := _request(source)) is not None:
-            sink.write(b"".join(_answer(separator, tables)) + b"end 0\n")
+            frames = _export(separator, tables, given) if given or "files" in tables else _answer(separator, tables)
+            sink.write(b"".join(frames) + b"end 0\n")
             sink.flush()
     finally:
         sys.stdout = before
 
 
-def _request(source: BinaryIO) -> dict[str, pa.Table] | None:
-    tables: dict[str, pa.Table] = {}
+def _request(source: BinaryIO) -> dict[str, Any] | None:
+    tables: dict[str, Any] = {}
     while line := source.readline():
         name, size = line.decode().split()
         if name == "end":
             return tables
-        tables[name] = pa.ipc.open_stream(source.read(int(size))).read_all()
+        body = source.read(int(size))
+        tables[name] = json.loads(body) if name == "summary" else pa.ipc.open_stream(body).read_all()
     return None
+
+
+def _export(exporter: Any, tables: dict[str, Any], given: dict[str, list[pa.Table]]) -> list[bytes]:
+    """Keeps the tables of a result, and has them written when the summary comes."""
+    if not hasattr(exporter, "export"):
+        raise TypeError(f"{type(exporter).__name__} is asked for export: expected a class with the method `export`")
+    if "summary" not in tables:
+        for name, table in tables.items():
+            given.setdefault(name, []).append(table)
+        return []
+    files = given.pop("files")[0]
+    paths = dict(zip(files["name"].to_pylist(), files["path"].to_pylist()))
+    config = json.loads(_about(files)["config"])
+    exporter.export({name: pa.concat_tables(parts) for name, parts in given.items()}, tables["summary"], paths, config)
+    return []
 
 
 def _answer(separator: Any, tables: dict[str, pa.Table]) -> list[bytes]:

@@ -93,3 +93,27 @@ def test_a_served_class_is_equal_to_the_built_in_method(tmp_path: Path) -> None:
         for part in ("re", "im"):
             a, b = (np.array(value["harmonics"][part], float) for value in (one, other))
             np.testing.assert_allclose(a, b, rtol=0, atol=1e-9)
+
+
+def test_an_exporter_gets_all_tables_and_writes_its_files(tmp_path: Path) -> None:
+    class Mine:
+        def export(self, tables: dict[str, Any], summary: dict[str, Any], files: dict[str, str], config: dict[str, Any]) -> None:
+            assert tables["form"]["form_um"].to_pylist() == [1.0, 2.0, 1.0, 2.0] and config == {"digits": 3}
+            Path(files["a.txt"]).write_text(summary["title"])
+
+    about = {"runout.protocol": "1", "runout.stage": "export", "runout.config": '{"digits": 3}'}
+    files = pa.table({"name": ["a.txt"], "path": [str(tmp_path / "b")]}).replace_schema_metadata(about)
+    form = pa.table({"form_um": [1.0, 2.0]}).replace_schema_metadata(about)
+    bodies = [("files", stream(files)), ("form", stream(form)), ("form", stream(form)), ("summary", b'{"title": "shaft"}')]
+    asked = b"".join(f"{name} {len(body)}\n".encode() + body + b"end 0\n" for name, body in bodies)
+    out = io.BytesIO()
+    external.serve(Mine(), io.BytesIO(asked), out)
+    assert out.getvalue() == b"end 0\n" * 4 and (tmp_path / "b").read_text() == "shaft"
+    with pytest.raises(TypeError, match="asked for export: expected a class with the method `export`"):
+        external.serve(object(), io.BytesIO(asked), io.BytesIO())  # type: ignore[arg-type]
+
+
+def test_a_program_started_from_a_terminal_ends(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys.stdin, "isatty", lambda: True, raising=False)
+    with pytest.raises(SystemExit, match="runout plugins test -- "):
+        external.serve(object())  # type: ignore[arg-type]

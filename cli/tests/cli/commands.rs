@@ -236,7 +236,7 @@ fn a_program_that_fails_a_check_is_named() {
     let folder = Folder::with(&[]);
     let ran = folder.run(&["plugins", "test", "--", "sh", "-c", "echo no licence >&2; exit 3"]);
     assert_eq!(ran.status, 1, "{}", ran.shown());
-    assert!(ran.stdout.starts_with("fails       it answers with harmonics"), "{}", ran.stdout);
+    assert!(ran.stdout.starts_with("fails       it starts and answers: "), "{}", ran.stdout);
     assert!(ran.stdout.contains("exit status: 3") && ran.stdout.contains("no licence"), "{}", ran.stdout);
     assert!(ran.stderr.contains("1 check failed"), "{}", ran.stderr);
     for words in [&["plugins", "test"][..], &["plugins", "hdf5", "--", "sh"]] {

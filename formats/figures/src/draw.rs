@@ -31,7 +31,18 @@ const COLOURS: [&str; 7] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00
 
 /// As SVG.
 pub(crate) fn svg(scene: &Scene) -> String {
-    SvgBackend::new().render_scene(scene)
+    numbered_from_0(SvgBackend::new().render_scene(scene))
+}
+
+/// The library counts clip paths over all drawings of a process. Here they count from 0 in each: equal scenes give equal texts.
+fn numbered_from_0(svg: String) -> String {
+    const ID: &str = "id=\"kuva-clip-";
+    let numbers = svg.split(ID).skip(1).filter_map(|rest| rest.split('"').next()).map(str::to_owned);
+    let numbers: Vec<String> = numbers.collect();
+    numbers.iter().enumerate().fold(svg, |svg, (index, number)| {
+        svg.replace(&format!("{ID}{number}\""), &format!("id=\"clip-{index}\""))
+            .replace(&format!("(#kuva-clip-{number})"), &format!("(#clip-{index})"))
+    })
 }
 
 /// As PNG.

@@ -5,6 +5,7 @@
 mod answer;
 mod config;
 mod conformance;
+mod exporter;
 mod frame;
 mod loader;
 mod points;
@@ -15,7 +16,7 @@ mod session;
 mod tables;
 mod turns;
 
-pub use config::{ExternalLoaderConfig, ExternalSeparatorConfig};
+pub use config::{ExternalExporterConfig, ExternalLoaderConfig, ExternalSeparatorConfig};
 pub use conformance::{Check, Conformance, Found};
 pub use process::end_all;
 
@@ -25,4 +26,5 @@ use runout_core::pipeline::{Plugin, Registry};
 pub fn register(registry: &mut Registry) {
     registry.loaders.add(Plugin::of::<ExternalLoaderConfig>());
     registry.separators.add(Plugin::of::<ExternalSeparatorConfig>());
+    registry.exporters.add(Plugin::of::<ExternalExporterConfig>());
 }

@@ -135,11 +135,15 @@ impl Process {
                         Some(bytes) => {
                             format!("its stderr says why; `memory_mb` ({}) limits its memory", megabytes(bytes))
                         }
-                        None => "its stderr says why; run the command by hand".into(),
+                        None => format!("its stderr says why; {}", program.trial()),
                     },
                     said: String::new(),
                 },
-                _ => bad("closed its output and gave no answer".into()),
+                _ => Failure {
+                    kind: ErrorKind::Interrupted,
+                    help: format!("an answer ends with the line `end 0`, flushed; {}", program.trial()),
+                    ..bad("closed its output and gave no answer".into())
+                },
             },
             Some(NoFrame::CutOff { name, wanted, found }) => {
                 bad(format!("announced `{name}` with {wanted} bytes and gave {found}"))

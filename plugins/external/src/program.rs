@@ -102,6 +102,11 @@ impl Program {
         self.command.iter().map(word).collect::<Vec<_>>().join(" ")
     }
 
+    /// How it is tried without a pipeline, for messages.
+    pub(crate) fn trial(&self) -> String {
+        format!("`runout plugins test -- {}` tries a separator of turns on simulated data", self.shown())
+    }
+
     /// A failure as an error of an operation on an object.
     pub(crate) fn error(&self, operation: &str, object: &str, failure: &Failure) -> Error {
         let Failure { kind, problem, help, said } = failure;

@@ -47,8 +47,21 @@ fn a_program_that_is_right_passes_and_each_mistake_is_named() {
         println!("{check:?}");
         assert!(matches!(check.found, Found::Fails(_)), "{name}");
     }
-    let silent = folder.path().join("silent.py");
-    fs::write(&silent, "").unwrap();
-    let checks = checks(&python, &silent);
-    assert!(matches!(&checks[..], [Check { found: Found::Fails(_), .. }]), "{checks:?}");
+    let others = [
+        ("", "it starts and answers", "closed its output"),
+        ("raise SystemExit('no licence')", "it starts and answers", "no licence"),
+        (
+            "import sys\nsys.stdin.buffer.readline(); print('hello', flush=True)",
+            "its answers are in the protocol",
+            "hello",
+        ),
+    ];
+    for (text, name, words) in others {
+        let script = folder.path().join("wrong.py");
+        fs::write(&script, text).unwrap();
+        let checks = checks(&python, &script);
+        let failed: Vec<&Check> = checks.iter().filter(|check| check.found != Found::Holds).collect();
+        let [Check { name: failed, found: Found::Fails(why) }] = failed[..] else { panic!("{checks:?}") };
+        assert!(*failed == name && why.contains(words), "{checks:?}");
+    }
 }

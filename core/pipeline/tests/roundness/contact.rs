@@ -1,6 +1,9 @@
 //! Contact conditions: what proves a reference circle.
 
-use runout_core::standards::{reference::Reference, roundness::Circle};
+use runout_core::standards::{
+    reference::Reference,
+    roundness::{Angles, Circle, Points},
+};
 
 use super::profiles::{Profile, profile};
 
@@ -125,4 +128,20 @@ fn contact_conditions_hold_on_polar_plots() {
     }
     assert!(wrong.is_empty(), "{} wrong, such as\n{}", wrong.len(), wrong[..wrong.len().min(20)].join("\n"));
     assert!(found > 5000, "only {found} of 6000 have a circle");
+}
+
+/// Deviations so large that their squares are no numbers have no reference circle, and the search for one ends.
+#[test]
+fn deviations_without_bound_have_no_reference_circle() {
+    for reference in
+        [Reference::LeastSquares, Reference::MinimumZone, Reference::MaximumInscribed, Reference::MinimumCircumscribed]
+    {
+        let mut points = Points::default();
+        let deviations_um: Vec<f64> = (0..720).map(|index| if index % 2 == 0 { 1e300 } else { 0.5e300 }).collect();
+        points.set_profile(&Angles::equal(720), &deviations_um, 15.0);
+        let ront_um = points.reference(reference).map(|circle| points.values(&circle).ront_um);
+        assert!(ront_um.is_none_or(|ront_um| !ront_um.is_nan()), "{reference:?}: {ront_um:?}");
+        points.set_profile(&Angles::equal(720), &[1e300; 720], 15.0);
+        let _ends = points.reference(reference);
+    }
 }

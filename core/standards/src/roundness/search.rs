@@ -129,6 +129,9 @@ impl<'a, const N: usize> Search<'a, N> {
                 let better = loop {
                     let (low, high) = self.extremes(&next);
                     let better = self.merit(&next, low, high);
+                    if !better.is_finite() {
+                        return Err(Undetermined::NotFound);
+                    }
                     if better <= merit + tolerance || distance(next, place) <= tolerance {
                         break (low, high, better);
                     }

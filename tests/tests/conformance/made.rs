@@ -1,0 +1,88 @@
+//! Points of domains that have no simulator, by formulas of their own.
+
+use std::{f64::consts::TAU, fmt::Write};
+
+/// A file of points, by its name.
+///
+/// # Panics
+/// When there is none of that name.
+pub(crate) fn points(name: &str) -> String {
+    let mut text = String::new();
+    match name {
+        // A slide of 1.5 µm and a part of 0.9 µm, whose sum and difference the two setups read, up and down.
+        "traces" => {
+            text.push_str("trace,setup,z_mm,reading_um\n");
+            for repeat in 0..3 {
+                for (setup, sign) in [("initial", 1.0), ("reversed", -1.0)] {
+                    for step in 0..60 {
+                        let z_mm = 2.0 * f64::from(step);
+                        let slide = 1.5 * (TAU * z_mm / 95.0).sin();
+                        let part = 0.9 * (TAU * z_mm / 61.0).cos();
+                        let _ = writeln!(text, "{setup}-{repeat},{setup},{z_mm},{}", part + sign * slide);
+                    }
+                }
+            }
+        }
+        // A circle about the origin.
+        "quadrature" => {
+            text.push_str("phase_deg,radius_counts\n");
+            for step in 0..800 {
+                let phase = TAU * f64::from(step) * 0.034_13;
+                let [cosine, sine] = [1000.0 * phase.cos(), 1000.0 * phase.sin()];
+                let _ = writeln!(text, "{},{}", sine.atan2(cosine).to_degrees(), cosine.hypot(sine));
+            }
+        }
+        // Three circles with lobes of orders 2, 3 and 7.
+        "circles" => {
+            text.push_str("trace,kind,z_mm,angle_deg,deviation_um\n");
+            for circle in 0..3 {
+                for step in 0..180 {
+                    let (angle, more) = (TAU * f64::from(step) / 180.0, f64::from(circle));
+                    let form = 3.0 * (2.0 * angle).cos()
+                        + (1.0 + 0.2 * more) * (3.0 * angle).sin()
+                        + 0.5 * (7.0 * angle).cos();
+                    let deviation = form + 4.0 * (angle - more).cos();
+                    let _ = writeln!(text, "C{circle},circle,{},{},{deviation}", 10.0 * more, 2.0 * f64::from(step));
+                }
+            }
+        }
+        // Two hours of an exponential rise of each axis.
+        "drift" => {
+            text.push_str("time_s,x_um,y_um,z_um\n");
+            for step in 0..720 {
+                let time_s = 10.0 * f64::from(step);
+                let rise = 1.0 - (-time_s / 1800.0).exp();
+                let _ = writeln!(text, "{time_s},{},{},{}", 4.0 * rise, -2.5 * rise, 11.0 * rise);
+            }
+        }
+        // Five runs of each direction at eleven targets.
+        "positioning" => {
+            text.push_str("target_mm,deviation_um,direction,run\n");
+            for run in 1..=5 {
+                for direction in [1, -1] {
+                    for step in 0..11 {
+                        let step = if direction > 0 { step } else { 10 - step };
+                        let target_mm = 50.0 * f64::from(step) + 1.7 * f64::from(step % 3);
+                        let error = 0.01 * target_mm + 2.0 * (target_mm / 130.0).sin() - 0.6 * f64::from(direction);
+                        let _ = writeln!(text, "{target_mm},{error},{direction},{run}");
+                    }
+                }
+            }
+        }
+        // Three turns ahead and three back, with lost motion and lobes.
+        "path" => {
+            text.push_str("angle_deg,deviation_um,direction\n");
+            for direction in [1, -1] {
+                for step in 0..3 * 360 {
+                    let step = if direction > 0 { step } else { 3 * 360 - 1 - step } % 360;
+                    let angle = TAU * f64::from(step) / 360.0;
+                    let lost_motion = 0.8 * f64::from(direction) * angle.sin();
+                    let deviation = 4.0 * (2.0 * angle).cos() + 1.5 * (angle - 0.7).cos() + lost_motion;
+                    let _ = writeln!(text, "{step},{deviation},{direction}");
+                }
+            }
+        }
+        _ => panic!("no points are made under the name {name}"),
+    }
+    text
+}
