@@ -198,7 +198,9 @@ fn pipeline(folder: &Path, text: &str, registry: &Registry) -> Result<Pipeline, 
 #[test]
 fn every_exporter_writes_every_domain_or_is_refused_in_words() {
     let registry = builtin::registry();
-    let exporters: Vec<&str> = registry.exporters.iter().map(|exporter| exporter.name).collect();
+    // A program of the user is tested with one (`plugins/external`).
+    let names = registry.exporters.iter().map(|exporter| exporter.name);
+    let exporters: Vec<&str> = names.filter(|name| *name != "external").collect();
     assert!(exporters.len() >= 6, "{exporters:?}");
     let domains = [
         spindle(),

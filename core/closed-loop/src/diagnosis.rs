@@ -67,6 +67,14 @@ impl Diagnosis {
         if sets.is_empty() { verdict } else { format!("{verdict}. Not decided: {}", sets.join("; ")) }
     }
 
+    /// Adds tests of the data themselves: what refutes them is left unexplained, whatever the model.
+    pub fn refute(&mut self, checks: &[Check]) {
+        self.consistency.extend_from_slice(checks);
+        if checks.iter().any(Check::refutes) {
+            self.verdict = Verdict::Unexplained;
+        }
+    }
+
     /// Takes the uncertainty of effects that were added where something unexplained is left: it is of a model that the data refute.
     pub fn withhold_refuted(&mut self) {
         let parameters = self.added.iter_mut().flat_map(|added| &mut added.parameters);

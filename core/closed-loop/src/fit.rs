@@ -77,6 +77,7 @@ pub fn refit<M: Model>(model: &M, start: Vec<Setting>, fixed: usize) -> Result<R
     }
     let system = system(&fit, &settings[fixed..]);
     let mut covariance = system.covariance();
+    widen_by_open_parameters(&mut covariance, &system, &settings[fixed..]);
     for open in fit.open_within_bounds() {
         widen(&mut covariance, &system, &open);
     }
@@ -91,6 +92,24 @@ pub(super) fn first_step(fit: &impl Fit, free: &[Setting]) -> Vec<f64> {
 /// The linearised system J δ ≈ −r.
 fn system(fit: &impl Fit, free: &[Setting]) -> Basis {
     Basis::of(free.iter().flat_map(|setting| fit.signature(setting.effect)).collect())
+}
+
+/// Adds what the data leave open within an effect: a parameter whose trace is that of others of the same effect may be as large as those are
+/// found, and the others with it.
+fn widen_by_open_parameters(covariance: &mut [Vec<f64>], system: &Basis, free: &[Setting]) {
+    for (column, open) in system.null_directions() {
+        let mut before = 0;
+        let effect = free.iter().find(|setting| {
+            before += setting.values.len();
+            column < before
+        });
+        let Some(Setting { values, .. }) = effect else { continue };
+        let found = values.iter().filter(|value| **value != 0.0).count().max(1);
+        let square = values.iter().map(|value| value * value).sum::<f64>() / found as f64;
+        for (row, of_row) in covariance.iter_mut().zip(&open) {
+            row.iter_mut().zip(&open).for_each(|(entry, of_column)| *entry += square * of_row * of_column);
+        }
+    }
 }
 
 /// Adds to the variance of each parameter the square of what the harmonic to which it is most sensitive moves it by, at the phase

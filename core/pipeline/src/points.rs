@@ -6,6 +6,7 @@ use runout_error::{Error, Result};
 use runout_evaluate::height_grid::HeightGrid;
 use runout_turning::{input_file::InputFile, provenance::Input};
 
+pub mod measured;
 pub mod mistakes;
 
 /// Numbers of a row without time and repeat from which on equal rows are no chance.
@@ -52,6 +53,8 @@ pub struct PointColumn {
     pub kind: PointKind,
     /// Whether points may lack it.
     pub optional: bool,
+    /// Whether it holds readings: what a sensor gave, and no command, place or time.
+    pub measured: bool,
 }
 
 /// What a column of points holds.
@@ -73,13 +76,19 @@ impl PointColumn {
     /// A column that the method needs.
     #[must_use]
     pub const fn needed(name: &'static str, kind: PointKind, unit: &'static str, about: &'static str) -> Self {
-        Self { name, unit, about, kind, optional: false }
+        Self { name, unit, about, kind, optional: false, measured: false }
     }
 
     /// A column that the method can use.
     #[must_use]
     pub const fn optional(name: &'static str, kind: PointKind, unit: &'static str, about: &'static str) -> Self {
-        Self { name, unit, about, kind, optional: true }
+        Self { name, unit, about, kind, optional: true, measured: false }
+    }
+
+    /// The same as a column of readings.
+    #[must_use]
+    pub const fn measured(self) -> Self {
+        Self { measured: true, ..self }
     }
 }
 

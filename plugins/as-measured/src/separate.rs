@@ -61,8 +61,8 @@ const PROFILE: [PointColumn; 4] = [
 
 const WALL: [PointColumn; 6] = [
     PointColumn::needed("angle_deg", Number, "deg", "angle about the axis"),
-    PointColumn::optional("radius_mm", Number, "mm", "distance from the axis; or deviation_um"),
-    PointColumn::optional("deviation_um", Number, "um", "distance from the axis less the nominal radius"),
+    PointColumn::optional("radius_mm", Number, "mm", "distance from the axis; or deviation_um").measured(),
+    PointColumn::optional("deviation_um", Number, "um", "distance from the axis less the nominal radius").measured(),
     PointColumn::optional("z_mm", Number, "mm", "height along the axis"),
     PointColumn::optional("trace", Trace, "", "name of the circle, whose points follow one another"),
     PointColumn::optional("kind", TraceKind, "", "what the trace runs along: circle, helix, generatrix"),

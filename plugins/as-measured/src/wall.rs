@@ -60,18 +60,32 @@ pub(crate) fn circles(points: &Points, config: &AsMeasuredConfig) -> Result<(Poi
     let sorted = |values: &[f64]| order.iter().map(|index| values[*index]).collect::<Vec<f64>>();
     let columns = [("angle_deg", sorted(&angle_deg)), ("z_mm", sorted(&z_mm)), ("deviation_um", sorted(&deviation_um))];
     let columns = columns.into_iter().map(|(name, values)| Column { name: name.into(), values });
+    let counts: Vec<usize> = traces.iter().map(|trace| trace.points.len()).collect();
     let placed = Points { columns: columns.collect(), traces, labels: Vec::new(), ..points.clone() };
     let separator = LeastSquaresCylinderConfig {
         radius_mm,
         used: None,
         hold_out: Vec::new(),
-        max_order: config.max_order.unwrap_or(ORDERS),
+        max_order: config.max_order.unwrap_or_else(|| usual_order(&counts)),
         outlier_mad: config.outlier_mad,
         outlier_order: config.max_order.unwrap_or(50),
         max_lobes: 2,
     };
     let separator = separator.separator().map_err(|fault| refuse(fault.to_string()).of(ErrorKind::Configuration))?;
     Ok((placed, separator))
+}
+
+/// Points of a circle that its form leaves to show the noise: so many, and this part of all.
+const SPARE: usize = 10;
+const SPARE_PART: usize = 10;
+/// A quarter of the points is the highest order at least: then half of them are spare.
+const POINTS_AN_ORDER: usize = 4;
+
+/// The highest order where none is stated, of circles of so many points.
+fn usual_order(points: &[usize]) -> usize {
+    let fewest = points.iter().copied().min().unwrap_or(0);
+    let spared = fewest.saturating_sub(SPARE.max(fewest / SPARE_PART)) / 2;
+    spared.max(fewest / POINTS_AN_ORDER).clamp(2, ORDERS)
 }
 
 /// The order of the points by section, and a trace a section: circles at their heights, or all points as one circle or helix.

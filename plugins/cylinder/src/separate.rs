@@ -75,7 +75,7 @@ pub const COLUMNS: [PointColumn; 5] = [
     PointColumn::needed("kind", TraceKind, "", "what the trace runs along: circle, helix, generatrix"),
     PointColumn::needed("z_mm", Number, "mm", "height"),
     PointColumn::needed("angle_deg", Number, "deg", "angle about the measuring machine's axis"),
-    PointColumn::needed("deviation_um", Number, "um", "distance from that axis less the nominal radius"),
+    PointColumn::needed("deviation_um", Number, "um", "distance from that axis less the nominal radius").measured(),
 ];
 
 impl PointSeparator for LeastSquaresCylinder {

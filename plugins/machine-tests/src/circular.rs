@@ -69,7 +69,7 @@ const COLUMNS: [PointColumn; 3] = [
         "deg",
         "angle on the path, from the first axis towards the second; it may go on over the turns",
     ),
-    PointColumn::needed("deviation_um", Number, "um", "radius less the nominal one"),
+    PointColumn::needed("deviation_um", Number, "um", "radius less the nominal one").measured(),
     PointColumn::optional(
         "direction",
         Number,

@@ -16,7 +16,8 @@
 //! Noise σ ε of independent means can only raise a range on the whole: between the windows in which the axis is truly farthest out the reading differs
 //! from the true range R by σ (ε − ε′), and the range found, R̂, is not below it; so R ≤ R̂ − σ (ε − ε′). And R̂ is at most R and the largest ε of
 //! the windows that may be farthest out on each side; so R ≥ R̂ − σ (max ε + max ε′). The interval is from the 2.5 % quantile of the latter to the
-//! 97.5 % quantile of the former. It holds for every course.
+//! 97.5 % quantile of the former. It holds for every course of means. Where an axis is farthest out in the first or the last window, it went on
+//! within that by half of the change to the next one: so much the upper end is higher.
 
 mod course;
 
@@ -34,7 +35,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use crate::draws::Draw;
-use course::{OF_SECOND_DIFFERENCES, levels, noise_of, range, smoothed, stable_after};
+use course::{OF_SECOND_DIFFERENCES, levels, noise_of, range, smoothed, stable_after, within_ends};
 
 /// Means that a test has at least: fewer show neither their noise nor a course.
 const FEWEST_MEANS: usize = 20;
@@ -256,9 +257,9 @@ impl Axis {
         })
     }
 
-    /// The range and what noise may have taken from it.
+    /// The range and what noise may have taken from it, and means over windows.
     fn most(&self, draw: &mut Draw) -> f64 {
-        (range(&self.means) + self.noise_um * (draw.normal() - draw.normal())).max(0.0)
+        (range(&self.means) + within_ends(&self.means) + self.noise_um * (draw.normal() - draw.normal())).max(0.0)
     }
 }
 

@@ -74,12 +74,12 @@ struct Positioning(PositioningConfig);
 
 const LINEAR: [PointColumn; 3] = [
     PointColumn::needed("target_mm", Number, "mm", "commanded position"),
-    PointColumn::needed("deviation_um", Number, "um", "actual less commanded position"),
+    PointColumn::needed("deviation_um", Number, "um", "actual less commanded position").measured(),
     DIRECTION,
 ];
 const ROTARY: [PointColumn; 3] = [
     PointColumn::needed("target_deg", Number, "deg", "commanded angle"),
-    PointColumn::needed("deviation_arcsec", Number, "arcsec", "actual less commanded angle"),
+    PointColumn::needed("deviation_arcsec", Number, "arcsec", "actual less commanded angle").measured(),
     DIRECTION,
 ];
 const DIRECTION: PointColumn = PointColumn::optional(

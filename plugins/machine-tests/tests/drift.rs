@@ -149,7 +149,7 @@ fn readings_and_windows_that_stand_out_are_said() {
     };
     let said = |outcome: &Outcome, what: &str| outcome.remarks.iter().find(|remark| remark.contains(what)).cloned();
     let clean = separated("", &recorded(7, 0.3)).unwrap();
-    assert!(clean.remarks.is_empty(), "{:?}", clean.remarks);
+    assert!(said(&clean, "are far").or(said(&clean, "by one window alone")).is_none(), "{:?}", clean.remarks);
     let mut points = recorded(7, 0.3);
     for second in (500..SECONDS).step_by(1000) {
         z(&mut points, second, if second % 3 == 0 { 500.0 } else { -500.0 });

@@ -42,7 +42,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use kernel::{Kernel, PASS_BAND};
-use marks::{angle_std_rad, turn_angle_std_rad};
+use marks::{angle_std_rad, known_within, turn_angle_std_rad};
 use resample::Resampling;
 use turns::Turn;
 
@@ -336,6 +336,7 @@ impl Averager for SynchronousAverage {
         if let Some(speed_rpm) = speed_rpm {
             in_orders(&mut capture.responses, speed_rpm, &capture.object, &mut warnings);
         }
+        let marks_within = known_within(&capture);
         let mut profile = Profile {
             object: capture.object,
             setup: capture.setup,
@@ -353,8 +354,8 @@ impl Averager for SynchronousAverage {
             split: outcome.split,
             spread: outcome.spread,
             turns: count,
-            angle_std_rad: angle_std_rad(&capture.marks, capture.marks_within_samples),
-            turn_angle_std_rad: turn_angle_std_rad(&capture.marks, capture.marks_within_samples),
+            angle_std_rad: angle_std_rad(&capture.marks, marks_within),
+            turn_angle_std_rad: turn_angle_std_rad(&capture.marks, marks_within),
             speed_rpm,
             sample_rate_hz: capture.sample_rate_hz,
             responses: capture.responses,

@@ -38,9 +38,12 @@ pub(crate) fn columns(axis: Axis) -> Vec<PointColumn> {
     vec![
         PointColumn::needed("ball", Label, "", "id of the ball, one of `balls`"),
         PointColumn::needed(axis.command(), Number, "deg", command),
-        PointColumn::needed("dx_mm", Number, "mm", "actual less nominal place of the ball along the machine's x"),
-        PointColumn::needed("dy_mm", Number, "mm", "actual less nominal place of the ball along the machine's y"),
-        PointColumn::needed("dz_mm", Number, "mm", "actual less nominal place of the ball along the machine's z"),
+        PointColumn::needed("dx_mm", Number, "mm", "actual less nominal place of the ball along the machine's x")
+            .measured(),
+        PointColumn::needed("dy_mm", Number, "mm", "actual less nominal place of the ball along the machine's y")
+            .measured(),
+        PointColumn::needed("dz_mm", Number, "mm", "actual less nominal place of the ball along the machine's z")
+            .measured(),
         PointColumn::optional("time_s", Number, "s", "time; without it the rows are in the order of time"),
         PointColumn::optional("repeat", Number, "", "number of the pass"),
         PointColumn::optional("std_um", Number, "um", "standard uncertainty of one coordinate of this row"),

@@ -99,9 +99,9 @@ impl RTest {
 const COLUMNS: [PointColumn; 5] = [
     PointColumn::needed("a_deg", Number, "deg", "command of the A axis"),
     PointColumn::needed("c_deg", Number, "deg", "command of the C axis"),
-    PointColumn::needed("dx_mm", Number, "mm", "actual less nominal place of the ball along x"),
-    PointColumn::needed("dy_mm", Number, "mm", "actual less nominal place of the ball along y"),
-    PointColumn::needed("dz_mm", Number, "mm", "actual less nominal place of the ball along z"),
+    PointColumn::needed("dx_mm", Number, "mm", "actual less nominal place of the ball along x").measured(),
+    PointColumn::needed("dy_mm", Number, "mm", "actual less nominal place of the ball along y").measured(),
+    PointColumn::needed("dz_mm", Number, "mm", "actual less nominal place of the ball along z").measured(),
 ];
 
 impl PointSeparator for RTest {

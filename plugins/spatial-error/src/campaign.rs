@@ -41,19 +41,22 @@ pub(crate) const COLUMNS: [PointColumn; 9] = [
         Number,
         "um",
         "actual less commanded place along x; absent or empty where it was not measured",
-    ),
+    )
+    .measured(),
     PointColumn::optional(
         "dy_um",
         Number,
         "um",
         "actual less commanded place along y; absent or empty where it was not measured",
-    ),
+    )
+    .measured(),
     PointColumn::optional(
         "dz_um",
         Number,
         "um",
         "actual less commanded place along z; absent or empty where it was not measured",
-    ),
+    )
+    .measured(),
     PointColumn::optional("time_s", Number, "s", "time; without it the rows are in the order of time, evenly"),
     PointColumn::optional("repeat", Number, "", "number of the pass"),
     PointColumn::optional("std_um", Number, "um", "standard uncertainty of one coordinate of this row"),

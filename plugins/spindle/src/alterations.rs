@@ -100,6 +100,20 @@ pub enum PatternOf {
     Setup(usize),
     /// Those of a sensor; it turns with the part.
     Sensor(usize),
+    /// Those of a sensor; it turns with the spindle.
+    SensorOnSpindle(usize),
+    /// Those of a setup as a motion of the axis along x, which turns with the spindle.
+    MotionX(usize),
+    /// The same along y.
+    MotionY(usize),
+}
+
+impl PatternOf {
+    /// Whether it is on the surface of the part.
+    #[must_use]
+    pub fn is_form(self) -> bool {
+        matches!(self, Self::Spindle | Self::Setup(_) | Self::Sensor(_))
+    }
 }
 
 /// A share of one channel's displacement in the reading of another.

@@ -18,6 +18,7 @@ mod systems;
 pub use first_order::FirstOrder;
 pub use reference::ToReference;
 pub(crate) use seen_form::ENOUGH;
+pub use seen_form::SeenPattern;
 pub use systems::System;
 use systems::Systems;
 
@@ -84,8 +85,8 @@ pub struct Reading {
     pub motion_ratio: f64,
     /// Squared width of the sensor's spot on the part, in rad².
     pub spot_rad2: f64,
-    /// What it sees on the part besides the section's form: order, and amplitude as of a form's unknown, in µm.
-    pub patterns: Vec<(usize, Complex64)>,
+    /// What it has besides the form of the section and the motion, in µm.
+    pub patterns: Vec<SeenPattern>,
     /// ±1 as the rig declares it: readings are multiplied by it as they are read.
     pub declared_sign: f64,
 }

@@ -3,7 +3,12 @@
 //! Corrections are compared at low orders by the linear equations, which is fast and enough to choose: a wrong correction of a
 //! sound rig leaves far more than exact geometry does.
 
-use runout_core::{Complex64, model::foresight, rig::Rig};
+use runout_core::{
+    Complex64,
+    consistency::{Check, Test},
+    model::foresight,
+    rig::Rig,
+};
 
 use crate::{
     alterations::Alterations,
@@ -318,8 +323,8 @@ pub(crate) fn warning(
 /// What differs by less, relative, is the same recording: rounding of averages.
 const SAME: f64 = 1e-12;
 
-/// Setups and channels that hold one recording twice, noise included.
-pub(crate) fn copies(rig: &Rig, readings: &Readings) -> Vec<String> {
+/// Setups and channels that hold one recording twice, noise included: they are no readings of their own, and nothing that is said by them holds.
+pub(crate) fn copies(rig: &Rig, readings: &Readings) -> Vec<Check> {
     // Without noise, two readings may be the same by right.
     let Some(scatter) = &readings.scatter else { return Vec::new() };
     let (sensors, setups) = (rig.sensors.len(), rig.setups.len());
@@ -338,10 +343,13 @@ pub(crate) fn copies(rig: &Rig, readings: &Readings) -> Vec<String> {
     let setup_copies = pairs(setups)
         .map(|pair| pair_of(pair, setups))
         .filter(|[first, second]| (0..sensors).all(|sensor| same(first * sensors + sensor, second * sensors + sensor)));
-    let mut found: Vec<String> = setup_copies
+    let check = |of: String, finding: String| Check::new(Test::Measured, of, 0.0, &[], 0.0).finding(|| finding);
+    let mut found: Vec<Check> = setup_copies
         .map(|pair| {
             let [first, second] = pair.map(|setup| &rig.setups[setup].id);
-            format!("setups `{first}` and `{second}` have the same recording: one of them was stored twice")
+            let words =
+                format!("setups `{first}` and `{second}` have the same recording: one of them was stored twice");
+            check(format!("setups {first} {second}"), words)
         })
         .collect();
     let channel_copies = pairs(sensors)
@@ -349,7 +357,8 @@ pub(crate) fn copies(rig: &Rig, readings: &Readings) -> Vec<String> {
         .filter(|[first, second]| (0..setups).all(|setup| same(setup * sensors + first, setup * sensors + second)));
     found.extend(channel_copies.map(|pair| {
         let [first, second] = pair.map(|sensor| &rig.sensors[sensor].id);
-        format!("channels `{first}` and `{second}` have the same signal: one of them was recorded twice")
+        let words = format!("channels `{first}` and `{second}` have the same signal: one of them was recorded twice");
+        check(format!("channels {first} {second}"), words)
     }));
     found
 }

@@ -159,7 +159,8 @@ const COLUMNS: [PointColumn; 6] = [
     ),
     PointColumn::needed("setup", TraceKind, "", "setup that the trace was measured in"),
     PointColumn::needed("z_mm", Number, "mm", "place along the axis"),
-    PointColumn::needed("reading_um", Number, "um", "reading, which grows when the surface comes nearer to the probe"),
+    PointColumn::needed("reading_um", Number, "um", "reading, which grows when the surface comes nearer to the probe")
+        .measured(),
     PointColumn::optional(
         "time_s",
         Number,

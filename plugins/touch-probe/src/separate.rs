@@ -63,9 +63,10 @@ const COLUMNS: [PointColumn; 8] = [
         "deg",
         "direction of the touch in the machine, from the nominal centre; not needed with x_mm and y_mm",
     ),
-    PointColumn::optional("radius_mm", Number, "mm", "radius read, from the nominal centre; or x_mm and y_mm"),
-    PointColumn::optional("x_mm", Number, "mm", "place read along x, from the nominal centre"),
-    PointColumn::optional("y_mm", Number, "mm", "place read along y, from the nominal centre"),
+    PointColumn::optional("radius_mm", Number, "mm", "radius read, from the nominal centre; or x_mm and y_mm")
+        .measured(),
+    PointColumn::optional("x_mm", Number, "mm", "place read along x, from the nominal centre").measured(),
+    PointColumn::optional("y_mm", Number, "mm", "place read along y, from the nominal centre").measured(),
     PointColumn::optional(
         "repeat",
         Number,

@@ -157,6 +157,20 @@ impl Basis {
         made
     }
 
+    /// What each dependent column (its place in A) leaves open: coefficients x with A·x = 0 and 1 for that column.
+    #[must_use]
+    pub fn null_directions(&self) -> Vec<(usize, Vec<f64>)> {
+        let dependent = (0..self.shares.len()).filter(|column| !self.independent.contains(column));
+        let direction = |column: usize| {
+            let mut shares = self.shares[column].clone();
+            shares.resize(self.rank(), 0.0);
+            let mut open: Vec<f64> = self.solve_upper(shares).iter().map(|value| -value).collect();
+            open[column] = 1.0;
+            (column, open)
+        };
+        dependent.map(direction).collect()
+    }
+
     /// Number of independent columns.
     #[must_use]
     pub fn rank(&self) -> usize {
@@ -321,6 +335,13 @@ mod tests {
         assert_eq!((covariance[2][2], covariance[0][2]), (0.0, 0.0));
         // Var(slope) = 1/Σ(s − s̄)².
         assert!((covariance[1][1] - 0.2).abs() < 1e-12 && (basis.unit_variance()[1] - 0.2).abs() < 1e-12);
+        // 1, both and slope: both = 2·one − slope, so that slope + both − 2·one is nothing.
+        let [(column, open)] = &basis.null_directions()[..] else { panic!("one direction") };
+        assert_eq!(*column, 2);
+        assert!(
+            open.iter().zip([-2.0, 1.0, 1.0]).all(|(found, expected)| (found - expected).abs() < 1e-12),
+            "{open:?}"
+        );
         assert!(Basis::of(vec![vec![0.0; 3]]).dependent(), "a column of zeros");
         let slope = basis.weights().iter().map(|weights| dot(weights, &[1.0, 3.0, 5.0, 7.0])).collect::<Vec<f64>>();
         assert!(slope.iter().zip(found).all(|(one, other)| (one - other).abs() < 1e-12), "{slope:?}");

@@ -21,7 +21,7 @@ use super::{
 };
 use crate::{
     atomic_file::PendingFile,
-    points::Points,
+    points::{Points, measured},
     stage::{PointModel, PointSeparator, Source, Station, StationModel, StationSeparator},
     summary::Summary,
 };
@@ -212,6 +212,7 @@ fn diagnose_points(
     observer: &dyn Observer,
 ) -> Result<Diagnosed> {
     spare_inputs(&pipeline.diagnosed_outputs(), &points.inputs())?;
+    measured::refuse_impossible(points)?;
     let effects = model.effects_of(points)?;
     let settings = if model.points_name_targets() {
         let settings = pipeline.diagnose.settings_for(&effects);
@@ -220,7 +221,10 @@ fn diagnose_points(
         pipeline.diagnose.settings.clone()
     };
     let known = known(&effects, &settings.known, |_| Vec::new());
-    let found = model.diagnose(points, &closed_loop::Settings { max_added: MOST_ADDED, ..settings })?;
+    let mut found = model.diagnose(points, &closed_loop::Settings { max_added: MOST_ADDED, ..settings })?;
+    let checks = measured::checks(points, &separator.columns());
+    found.diagnosis.refute(&checks);
+    found.after.checks.extend(checks);
     let effects = corrections(&changes(known, &found.diagnosis));
     let of_run = point_run::findings(pipeline, points, separator)?;
     let mut diagnosis = Diagnosis { lost_orders: found.after.lost_orders.clone(), ..found.diagnosis };

@@ -7,7 +7,7 @@ use super::{
 };
 use crate::{
     height_grid::HeightGrid,
-    points::Points,
+    points::{Points, measured},
     stage::{Evaluable, EvaluableKind, Exporter, Form, Outcome, PlaneMap, PointSeparator},
 };
 use runout_closed_loop::{correction::Correction, diagnosis::Diagnosis};
@@ -34,7 +34,9 @@ pub(super) fn findings(pipeline: &Pipeline, points: &Points, separator: &dyn Poi
 }
 
 fn declared<'a>(separator: &'a dyn PointSeparator, points: &Points) -> Result<PointResult<'a>> {
-    let outcome = separator.separate(points)?;
+    measured::refuse_impossible(points)?;
+    let mut outcome = separator.separate(points)?;
+    outcome.checks.extend(measured::checks(points, &separator.columns()));
     Ok(PointResult { outcome, remarks: Some(separator), effects: Vec::new(), diagnosis: None })
 }
 

@@ -37,6 +37,19 @@ pub(super) fn range(course: &[f64]) -> f64 {
     high - low
 }
 
+/// By how much a course goes on within its first and last window where it is farthest out there: half of the change from the next one.
+pub(super) fn within_ends(course: &[f64]) -> f64 {
+    let [.., before_last, last] = course else { return 0.0 };
+    let [first, second, ..] = course else { return 0.0 };
+    let lowest_and_highest = |(low, high): (f64, f64), one: &f64| (low.min(*one), high.max(*one));
+    let (low, high) = course.iter().fold((f64::INFINITY, f64::NEG_INFINITY), lowest_and_highest);
+    let beyond = |end: f64, next: f64| {
+        let is_farthest = if end > next { end >= high } else { end <= low };
+        if is_farthest { 0.5 * (end - next).abs() } else { 0.0 }
+    };
+    beyond(*first, *second) + beyond(*last, *before_last)
+}
+
 /// Means over neighbours on both sides.
 pub(super) fn smoothed(means: &[f64], beside: usize) -> Vec<f64> {
     let around = |place: usize| {

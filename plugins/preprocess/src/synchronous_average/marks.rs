@@ -2,6 +2,23 @@
 
 use std::f64::consts::TAU;
 
+use runout_core::measurement::Capture;
+
+/// Half of a sample.
+const HALF: f64 = 0.5;
+/// Places of a sample that differ by less, in samples, are one: marks are written with so many digits.
+const ONE_PLACE: f64 = 1e-6;
+
+/// To how many samples the marks of a capture are known: as it says, or to half a sample where turns differ in length and all marks are at one
+/// place of a sample, as a counter gives them.
+pub(super) fn known_within(capture: &Capture) -> f64 {
+    let marks = &capture.marks;
+    let Some(first) = marks.first() else { return capture.marks_within_samples };
+    let is_one_place = marks.iter().all(|mark| ((mark - first) - (mark - first).round()).abs() < ONE_PLACE);
+    let differ = marks.windows(3).any(|three| (three[0] - 2.0 * three[1] + three[2]).abs() > HALF);
+    if is_one_place && differ { capture.marks_within_samples.max(HALF) } else { capture.marks_within_samples }
+}
+
 /// Standard uncertainty of the angle that the turns between marks are counted from, in rad; 0 for marks that are timed
 /// (`within` 0), and without a turn.
 ///

@@ -343,7 +343,7 @@ fn run(model: &SpindleModel, stations: &[Station], settings: &Settings) -> Resul
     }
     let rig = &model.traced.selection.rig;
     for data in &model.traced.data {
-        diagnosis.warnings.extend(wiring::copies(rig, &data.readings));
+        diagnosis.warnings.extend(wiring::copies(rig, &data.readings).into_iter().map(|check| check.finding));
         diagnosis.warnings.extend(sizes::mistaken_units(rig, &data.readings));
     }
     let highest = TRACED_ORDERS.min(closed.after.max_order());

@@ -1,16 +1,22 @@
-//! Effects of a pattern of one order, a cos nα + b sin nα, that certain readings have besides the part's form.
+//! Effects of one order, a cos nα + b sin nα, that certain readings have besides the part's form and the spindle's motion.
 //!
 //! | effect | has it | α counts from |
 //! | --- | --- | --- |
 //! | `chuck-form` | all readings: what turns with the spindle and not with the part, as lobes of a thin part in a chuck | the spindle |
 //! | `clamping-form` | those of a later setup: the part was clamped otherwise | the part |
 //! | `electrical-run-out` | those of one sensor: what the material does to it | the part |
+//! | `synchronous-pick-up` | those of one sensor: what it picks up at a whole order | the spindle |
+//! | `setup-motion-order` | those of a later setup, along x and along y: the axis moved otherwise | the spindle |
 //!
-//! ∂/∂a = e^{inα₀}, ∂/∂b = −i·e^{inα₀}, α₀ being the angle under the sensor at Φ = 0. All sections have the same pattern.
+//! ∂/∂a = e^{inα₀}, ∂/∂b = −i·e^{inα₀} where α counts from the part, α₀ being the angle under the sensor at Φ = 0; all sections have the same
+//! pattern.
 
 use std::f64::consts::TAU;
 
-use runout_core::{Complex64, model::diagnosis::Estimated};
+use runout_core::{
+    Complex64,
+    model::{Parameter, diagnosis::Estimated},
+};
 
 use super::{About, ActsOn, Alterations, Predicted, SpindleEffect, as_amplitude, parameter};
 use crate::{
@@ -24,44 +30,73 @@ pub(super) const ORDERS: std::ops::RangeInclusive<usize> = 2..=12;
 /// Angles of the part by which all setups are turned by whole periods, up to this: its pattern is then that of the form.
 const SAME_RAD: f64 = 1e-6;
 
+/// What has the pattern.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Chuck,
+    Clamping,
+    RunOut,
+    PickUp,
+    Motion,
+}
+
 /// A pattern of one order.
 pub(crate) struct OfOrder {
     order: usize,
-    of: fn(usize) -> PatternOf,
+    kind: Kind,
 }
 
 impl OfOrder {
     /// All of them.
     pub(super) fn all() -> impl Iterator<Item = Self> {
-        let kinds: [fn(usize) -> PatternOf; 3] = [|_| PatternOf::Spindle, PatternOf::Setup, PatternOf::Sensor];
-        ORDERS.flat_map(move |order| kinds.map(|of| Self { order, of }))
+        let kinds = [Kind::Chuck, Kind::Clamping, Kind::RunOut, Kind::PickUp, Kind::Motion];
+        ORDERS.flat_map(move |order| kinds.map(|kind| Self { order, kind }))
     }
 
-    /// With an amplitude of 1 of its cosine.
-    fn unit(&self, target: usize) -> Pattern {
-        Pattern { order: self.order, cosine: 1.0, sine: 0.0, of: (self.of)(target) }
+    /// With two parameters each, the amplitudes of cosine and sine.
+    fn parts(&self, target: usize) -> Vec<PatternOf> {
+        match self.kind {
+            Kind::Chuck => vec![PatternOf::Spindle],
+            Kind::Clamping => vec![PatternOf::Setup(target)],
+            Kind::RunOut => vec![PatternOf::Sensor(target)],
+            Kind::PickUp => vec![PatternOf::SensorOnSpindle(target)],
+            Kind::Motion => vec![PatternOf::MotionX(target), PatternOf::MotionY(target)],
+        }
     }
 }
 
 impl SpindleEffect for OfOrder {
     fn about(&self) -> About {
-        let (id, does, acts_on) = match (self.of)(0) {
-            PatternOf::Spindle => ("chuck-form", "a form turns with the spindle and not with the part", ActsOn::Rig),
-            PatternOf::Setup(_) => {
+        let (id, does, acts_on) = match self.kind {
+            Kind::Chuck => ("chuck-form", "a form turns with the spindle and not with the part", ActsOn::Rig),
+            Kind::Clamping => {
                 ("clamping-form", "the part has another form as it is clamped in one setup", ActsOn::LaterSetup)
             }
-            PatternOf::Sensor(_) => {
+            Kind::RunOut => {
                 ("electrical-run-out", "a sensor reads a pattern of the part that is no form", ActsOn::Sensor)
             }
+            Kind::PickUp => (
+                "synchronous-pick-up",
+                "a sensor picks up a whole order of the spindle that is no motion",
+                ActsOn::Sensor,
+            ),
+            Kind::Motion => {
+                ("setup-motion-order", "the spindle moves otherwise in one setup, at one order", ActsOn::LaterSetup)
+            }
         };
-        About { id, does, acts_on, parameters: vec![parameter("cosine", "um", 0.1), parameter("sine", "um", 0.1)] }
+        let both = |prefix: &str| ["cosine", "sine"].map(|part| parameter(&format!("{prefix}{part}"), "um", 0.1));
+        let parameters: Vec<Parameter> = match self.kind {
+            Kind::Motion => [both("x-"), both("y-")].concat(),
+            _ => both("").into(),
+        };
+        About { id, does, acts_on, parameters }
     }
 
     fn suits(&self, target: usize, layout: &Layout) -> bool {
         let radial = || layout.readings.iter().filter(|reading| !reading.view.is_axial());
         let beside = |reading: &Reading, count: usize| layout.radial_sensors(reading.section) >= count;
-        match (self.of)(target) {
-            PatternOf::Spindle => {
+        match self.kind {
+            Kind::Chuck => {
                 // Of what turns with the part in all setups, the form has it.
                 let turned = |reading: &Reading| reading.angle_rad - reading.part_angle_rad;
                 let periods = |reading: &Reading| {
@@ -71,27 +106,31 @@ impl SpindleEffect for OfOrder {
                 let differs = |reading: &Reading| (periods(reading) - periods(reading).round()).abs() > SAME_RAD;
                 radial().any(|reading| beside(reading, ENOUGH) && differs(reading))
             }
-            PatternOf::Setup(_) => radial().count() > 0,
-            PatternOf::Sensor(sensor) => radial().any(|reading| reading.sensor == sensor && beside(reading, 2)),
+            Kind::Clamping | Kind::Motion => radial().count() > 0,
+            Kind::RunOut | Kind::PickUp => radial().any(|reading| reading.sensor == target && beside(reading, 2)),
         }
     }
 
     fn alter(&self, target: usize, values: &[f64], alterations: &mut Alterations) {
-        alterations.patterns.push(Pattern { cosine: values[0], sine: values[1], ..self.unit(target) });
+        for (of, values) in self.parts(target).into_iter().zip(values.chunks_exact(2)) {
+            alterations.patterns.push(Pattern { order: self.order, cosine: values[0], sine: values[1], of });
+        }
     }
 
     fn partials(&self, target: usize, predicted: &Predicted) -> Vec<Vec<Complex64>> {
         let (layout, count) = (predicted.layout, predicted.layout.readings.len());
-        let parts = [(1.0, 0.0), (0.0, 1.0)].map(|(cosine, sine)| {
-            let pattern = Pattern { cosine, sine, ..self.unit(target) };
-            let mut partial = predicted.nothing();
-            let of_order = partial.iter_mut().skip(self.order * count);
-            for (reading, value) in layout.readings.iter().zip(of_order) {
-                *value = layout.on_part(reading, &pattern) * layout.part_phase(reading, self.order);
-            }
-            partial
-        });
-        parts.into()
+        let units = self.parts(target).into_iter().flat_map(|of| [(1.0, 0.0), (0.0, 1.0)].map(|unit| (of, unit)));
+        units
+            .map(|(of, (cosine, sine))| {
+                let pattern = Pattern { order: self.order, cosine, sine, of };
+                let mut partial = predicted.nothing();
+                let of_order = partial.iter_mut().skip(self.order * count);
+                for (reading, value) in layout.readings.iter().zip(of_order) {
+                    *value = layout.on_part(reading, &pattern) * layout.part_phase(reading, self.order);
+                }
+                partial
+            })
+            .collect()
     }
 
     fn order(&self) -> Option<usize> {
@@ -107,6 +146,22 @@ impl SpindleEffect for OfOrder {
     }
 
     fn present(&self, estimated: Vec<Estimated>) -> Vec<Estimated> {
-        as_amplitude(self.order, &estimated)
+        if self.kind != Kind::Motion {
+            return as_amplitude(self.order, &estimated);
+        }
+        let named = |axis: &str, one: Estimated| {
+            let name = if one.name == "order" { one.name } else { format!("{axis}{}", one.name) };
+            Estimated { name, ..one }
+        };
+        let axes = ["x-", "y-"].into_iter().zip(estimated.chunks(2));
+        let mut both: Vec<Estimated> = axes
+            .flat_map(|(axis, own)| as_amplitude(self.order, own).into_iter().map(move |one| named(axis, one)))
+            .collect();
+        let mut orders = 0;
+        both.retain(|one| {
+            orders += usize::from(one.name == "order");
+            one.name != "order" || orders == 1
+        });
+        both
     }
 }

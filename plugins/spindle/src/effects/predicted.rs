@@ -5,7 +5,7 @@ use runout_core::{Complex64, separation::Quantity};
 use super::correct::Curve;
 use crate::{
     alterations::Alterations,
-    layout::{FirstOrder, Layout, UM_PER_MM_URAD},
+    layout::{FirstOrder, Layout, SeenPattern, UM_PER_MM_URAD},
     solve::{Estimate, Readings},
 };
 
@@ -120,11 +120,13 @@ impl<'a> Predicted<'a> {
     fn add_patterns(&mut self) {
         let (layout, count) = (self.layout, self.layout.readings.len());
         for (index, reading) in layout.readings.iter().enumerate() {
-            for (order, value) in &reading.patterns {
+            for SeenPattern { order, value, is_form } in &reading.patterns {
                 let at = order * count + index;
                 if at < self.part.len() {
                     let value = value * layout.part_phase(reading, *order);
-                    self.part[at] += value;
+                    if *is_form {
+                        self.part[at] += value;
+                    }
                     self.readings[at] += value;
                 }
             }

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use runout_core::Complex64;
 
-use super::{Layout, Reading};
+use super::{Layout, Reading, SeenPattern};
 use crate::alterations::Alterations;
 
 impl Layout {
@@ -58,8 +58,12 @@ impl Layout {
         for index in 0..layout.readings.len() {
             let reading = &layout.readings[index];
             let patterns = alterations.patterns.iter();
-            let own = patterns.map(|pattern| (pattern.order, layout.on_part(reading, pattern)));
-            let own = own.filter(|(_, value)| *value != Complex64::ZERO).collect();
+            let own = patterns.map(|pattern| SeenPattern {
+                order: pattern.order,
+                value: layout.on_part(reading, pattern),
+                is_form: pattern.of.is_form(),
+            });
+            let own = own.filter(|pattern| pattern.value != Complex64::ZERO).collect();
             layout.readings[index].patterns = own;
         }
         layout

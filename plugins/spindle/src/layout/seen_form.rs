@@ -26,8 +26,19 @@ impl Reading {
     /// Whether it sees the section's form in a way of its own.
     #[must_use]
     pub fn has_own_profile(&self) -> bool {
-        self.spot_rad2 != 0.0 || !self.patterns.is_empty()
+        self.spot_rad2 != 0.0 || self.patterns.iter().any(|pattern| pattern.is_form)
     }
+}
+
+/// What a reading has besides the form of its section and the motion.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SeenPattern {
+    /// Per turn.
+    pub order: usize,
+    /// As it is on the part under the reading, as a form's unknown.
+    pub value: Complex64,
+    /// Whether it is on the surface: where the axis moves across the sensor, it sees another place of it.
+    pub is_form: bool,
 }
 
 /// Radial sensors of a section from which on motion does not absorb what each of them sees of its own.
@@ -43,16 +54,24 @@ impl Layout {
 
     /// A pattern as it is on the part under a reading, as a form's unknown; 0 where the reading does not have it.
     pub(crate) fn on_part(&self, reading: &Reading, pattern: &Pattern) -> Complex64 {
-        let turned_rad = match pattern.of {
-            // A chuck is at β less on the part than on the spindle.
-            PatternOf::Spindle => reading.angle_rad - reading.part_angle_rad,
-            PatternOf::Setup(setup) if setup == reading.setup => 0.0,
-            PatternOf::Sensor(sensor) if sensor == reading.sensor => 0.0,
-            _ => return Complex64::ZERO,
+        let along = |share: f64| {
+            let moves = self.motion_sign(reading.setup, pattern.order) * reading.motion_ratio * share;
+            Complex64::new(pattern.cosine, pattern.sine) * moves / self.part_phase(reading, pattern.order)
         };
         if reading.view.is_axial() {
             return Complex64::ZERO;
         }
+        // A chuck is at β less on the part than on the spindle.
+        let on_spindle = reading.angle_rad - reading.part_angle_rad;
+        let turned_rad = match pattern.of {
+            PatternOf::Spindle => on_spindle,
+            PatternOf::Setup(setup) if setup == reading.setup => 0.0,
+            PatternOf::Sensor(sensor) if sensor == reading.sensor => 0.0,
+            PatternOf::SensorOnSpindle(sensor) if sensor == reading.sensor => on_spindle,
+            PatternOf::MotionX(setup) if setup == reading.setup => return along(reading.angle_rad.cos()),
+            PatternOf::MotionY(setup) if setup == reading.setup => return along(reading.angle_rad.sin()),
+            _ => return Complex64::ZERO,
+        };
         self.of_part(Complex64::new(pattern.cosine, -pattern.sine) * Complex64::cis(pattern.order as f64 * turned_rad))
     }
 
@@ -60,7 +79,7 @@ impl Layout {
     pub(crate) fn take_out_patterns(&self, displacements: &mut [Complex64]) {
         let count = self.readings.len();
         for (index, reading) in self.readings.iter().enumerate() {
-            for (order, value) in &reading.patterns {
+            for SeenPattern { order, value, .. } in &reading.patterns {
                 if let Some(displacement) = displacements.get_mut(order * count + index) {
                     *displacement -= value * self.part_phase(reading, *order);
                 }

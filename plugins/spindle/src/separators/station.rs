@@ -18,7 +18,8 @@ pub(super) fn separate(
     method: impl FnOnce(&Readings) -> Operators,
 ) -> Result<Separation> {
     let (mut separation, readings) = solver.separate(station, method)?;
-    let mut warnings = wiring::copies(&solver.selection.rig, &readings);
+    separation.residual.checks.extend(wiring::copies(&solver.selection.rig, &readings));
+    let mut warnings = Vec::new();
     let units = sizes::mistaken_units(&solver.selection.rig, &readings);
     if units.is_empty() && separation.residual.chi2_per_dof > wiring::SUSPICIOUS_CHI2 {
         let weights = whitening(&readings);

@@ -181,7 +181,8 @@ impl<'a> SecondOrder<'a> {
         self.table = (0..sections).map(|section| table(&|order| form(order, section))).collect();
         let own = layout.readings.iter().enumerate().filter(|(_, reading)| reading.has_own_profile());
         let seen = |reading: &Reading, order: usize| {
-            let patterns = reading.patterns.iter().filter(|(of, _)| *of == order).map(|(_, value)| value);
+            let patterns = reading.patterns.iter().filter(|pattern| pattern.is_form && pattern.order == order);
+            let patterns = patterns.map(|pattern| pattern.value);
             form(order, reading.section) * reading.form_share(order) + patterns.sum::<Complex64>()
         };
         self.own = own.map(|(index, reading)| (index, table(&|order| seen(reading, order)))).collect();

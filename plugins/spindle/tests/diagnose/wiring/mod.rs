@@ -50,7 +50,11 @@ fn looked_into(rig: &RigConfig, station: &Station) -> StationDiagnosis {
 fn warned(rig: &RigConfig, station: &Station) -> Vec<String> {
     let rig = rig.clone().check().unwrap();
     match HarmonicLeastSquares::new(&rig, true, Weighting::TurnCovariance).separate(station) {
-        Ok(separated) => separated.warnings,
+        Ok(separated) => {
+            let checks = separated.residual.checks.into_iter();
+            let copies = checks.map(|check| check.finding).filter(|finding| finding.contains("have the same"));
+            separated.warnings.into_iter().chain(copies).collect()
+        }
         Err(error) => vec![error.to_string(), error.advice().unwrap_or_default().to_owned()],
     }
 }

@@ -1,0 +1,183 @@
+//! Tests of measured points that no method is needed for: whether readings are there twice, and whether a column was measured at all.
+
+use std::collections::HashMap;
+
+use runout_consistency::{Check, Test};
+use runout_error::{Error, ErrorKind, Result};
+
+use super::{PointColumn, Points};
+
+/// Readings in a row that come again elsewhere are a copy from so many on.
+const STRETCH: usize = 8;
+/// The same of a column whose resolution is coarse: sound readings come again there.
+const COARSE_STRETCH: usize = 40;
+/// A resolution is coarse from this share of the range on.
+const COARSE: f64 = 1e-3;
+/// Rows that are copies matter from this share of all on.
+const MATTERS: f64 = 0.1;
+/// Numbers beyond this are nothing that was measured, in any unit; sums of their squares leave the range of numbers.
+const LARGEST: f64 = 1e100;
+/// Fewest rows that show whether a column varies.
+const FEWEST_ROWS: usize = 6;
+
+/// Refuses numbers that are nothing that was measured.
+///
+/// # Errors
+/// The first one, with its row.
+pub fn refuse_impossible(points: &Points) -> Result<()> {
+    for column in &points.columns {
+        if let Some(row) = column.values.iter().position(|value| value.abs() > LARGEST) {
+            let problem = format!("`{}` is {:e} in row {}", column.name, column.values[row], row + 1);
+            let error = Error::new("separate", points.input.display().to_string(), problem);
+            return Err(error
+                .of(ErrorKind::UnsuitableData)
+                .help("a code for a missing value is no reading: leave the row out"));
+        }
+    }
+    Ok(())
+}
+
+/// What the readings themselves say, whatever the method is: `columns` are those that it takes.
+#[must_use]
+pub fn checks(points: &Points, columns: &[PointColumn]) -> Vec<Check> {
+    let measured: Vec<(&PointColumn, &[f64])> = columns
+        .iter()
+        .filter(|column| column.measured)
+        .filter_map(|column| Some((column, points.column(column.name).ok()?)))
+        .collect();
+    measured
+        .iter()
+        .find_map(|(column, values)| copied(column.name, values))
+        .into_iter()
+        .chain(unmeasured(&measured))
+        .collect()
+}
+
+/// Readings that come again digit by digit: their noise is that of the first ones, and no scatter shows it.
+fn copied(name: &str, values: &[f64]) -> Option<Check> {
+    let stretch = if is_coarse(values) { COARSE_STRETCH } else { STRETCH };
+    let bits: Vec<u64> = values.iter().map(|value| value.to_bits()).collect();
+    let varies = |window: &[u64]| {
+        let mut distinct = window.to_vec();
+        distinct.sort_unstable();
+        distinct.dedup();
+        4 * distinct.len() >= 3 * window.len()
+    };
+    let mut known: HashMap<&[u64], usize> = HashMap::new();
+    let mut is_copy = vec![false; values.len()];
+    let mut first = None;
+    for (row, window) in bits.windows(stretch).enumerate().filter(|(_, window)| varies(window)) {
+        let earlier = *known.entry(window).or_insert(row);
+        if row >= earlier + stretch {
+            is_copy[row..row + stretch].fill(true);
+            first.get_or_insert([earlier, row]);
+        }
+    }
+    // Each reading twice, one after the other.
+    let doubled = bits.windows(2).filter(|pair| pair[0] == pair[1]).count();
+    let copies = is_copy.iter().filter(|is_copy| **is_copy).count();
+    let count = values.len();
+    let enough = |copies: usize| copies >= stretch && copies as f64 >= MATTERS * count as f64;
+    let words = match first {
+        Some([earlier, row]) if enough(copies) => format!(
+            "{copies} of {count} readings `{name}` are equal to earlier ones in the same order, digit by digit, from row {} on to those from row {} on",
+            row + 1,
+            earlier + 1
+        ),
+        _ if enough(doubled) && !is_coarse(values) => {
+            format!("{doubled} of {count} readings `{name}` are equal to the one before, digit by digit")
+        }
+        _ => return None,
+    };
+    let share = copies.max(doubled) as f64 / count as f64;
+    let found = || format!("{words}: they are copies, which show no noise; leave them out");
+    Some(Check::new(Test::Measured, name, share, &[], 0.0).finding(found))
+}
+
+/// Whether the smallest step between readings is coarse beside their range.
+fn is_coarse(values: &[f64]) -> bool {
+    let mut sorted: Vec<f64> = values.iter().copied().filter(|value| value.is_finite()).collect();
+    sorted.sort_by(f64::total_cmp);
+    sorted.dedup();
+    // A column of one or two numbers has no resolution.
+    if sorted.len() < 3 {
+        return true;
+    }
+    let range = sorted.last().zip(sorted.first()).map_or(0.0, |(last, first)| last - first);
+    // The tenth part of the steps: two readings may come near to each other by chance.
+    let mut steps: Vec<f64> = sorted.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    steps.sort_by(f64::total_cmp);
+    let even = steps.first().zip(steps.get(steps.len() / 2)).is_some_and(|(least, middle)| middle < &(1.5 * least));
+    even && steps.first().is_some_and(|step| *step > COARSE * range)
+}
+
+/// Columns that the method needs and that hold one number, where others vary.
+fn unmeasured(measured: &[(&PointColumn, &[f64])]) -> Vec<Check> {
+    let is_constant = |values: &[f64]| values.windows(2).all(|pair| pair[0].to_bits() == pair[1].to_bits());
+    let enough = |values: &[f64]| values.len() >= FEWEST_ROWS;
+    let any_varies = measured.iter().any(|(_, values)| enough(values) && !is_constant(values));
+    let dead = measured.iter().filter(|(column, values)| any_varies && !column.optional && is_constant(values));
+    dead.map(|(column, values)| {
+        let found = || {
+            format!(
+                "`{}` is {} in every row: it was not measured, and what is said by it does not hold",
+                column.name,
+                values.first().copied().unwrap_or_default()
+            )
+        };
+        Check::new(Test::Measured, column.name, 0.0, &[], 0.0).finding(found)
+    })
+    .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::points::{Column, PointKind::Number};
+
+    const COLUMNS: [PointColumn; 3] = [
+        PointColumn::needed("place_mm", Number, "mm", "place"),
+        PointColumn::needed("dx_mm", Number, "mm", "reading").measured(),
+        PointColumn::needed("dz_mm", Number, "mm", "reading").measured(),
+    ];
+
+    /// Readings that look like noise, and places that come again.
+    fn reading(row: usize) -> f64 {
+        ((row * row * 7919 + row * 104_729) % 99_991) as f64 * 1e-7
+    }
+
+    fn findings(dx: impl Fn(usize) -> f64, dz: impl Fn(usize) -> f64, count: usize) -> Vec<String> {
+        let column = |name: &str, values: Vec<f64>| Column { name: name.into(), values };
+        let columns = vec![
+            column("place_mm", (0..count).map(|row| (row % 20) as f64).collect()),
+            column("dx_mm", (0..count).map(dx).collect()),
+            column("dz_mm", (0..count).map(dz).collect()),
+        ];
+        let points = Points { columns, ..Points::default() };
+        checks(&points, &COLUMNS).into_iter().filter(Check::refutes).map(|check| check.finding).collect()
+    }
+
+    #[test]
+    fn copies_and_dead_channels_are_named_and_sound_readings_are_not() {
+        let sound = |row: usize| reading(row + 1000);
+        assert_eq!(findings(reading, sound, 200), [""; 0]);
+        // A pass that was stored twice, and each reading twice.
+        let twice = findings(|row| reading(row % 100), sound, 200);
+        assert!(
+            twice.len() == 1 && twice[0].contains("100 of 200") && twice[0].contains("from row 101 on"),
+            "{twice:?}"
+        );
+        let doubled = findings(|row| reading(row / 2), sound, 200);
+        assert!(doubled.len() == 1 && doubled[0].contains("equal to the one before"), "{doubled:?}");
+        // One reading of a few that comes again, and repeats that a coarse resolution makes equal.
+        assert_eq!(findings(|row| if row == 50 { reading(20) } else { reading(row) }, sound, 200), [""; 0]);
+        assert_eq!(findings(|row| ((row % 20) * 3 % 17) as f64 * 1e-3, |row| 1e-3 * (row % 7) as f64, 40), [""; 0]);
+        let impossible =
+            Points { columns: vec![Column { name: "dx_mm".into(), values: vec![0.1, -1e300] }], ..Points::default() };
+        let refused = refuse_impossible(&impossible).unwrap_err().to_string();
+        assert!(refused.contains("`dx_mm` is -1e300 in row 2"), "{refused}");
+        let dead = findings(reading, |_| 0.0123, 200);
+        assert!(dead.len() == 1 && dead[0].contains("`dz_mm` is 0.0123 in every row"), "{dead:?}");
+        assert_eq!(findings(|_| 0.0, |_| 0.0, 200), [""; 0]);
+    }
+}
