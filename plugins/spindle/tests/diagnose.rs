@@ -4,6 +4,7 @@
 #![allow(clippy::unwrap_used, clippy::print_stdout, clippy::panic, reason = "tests")]
 
 mod channels;
+mod one_order;
 mod profiles;
 mod turns;
 mod unexplained;

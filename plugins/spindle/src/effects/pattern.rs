@@ -107,7 +107,9 @@ impl SpindleEffect for OfOrder {
                 radial().any(|reading| beside(reading, ENOUGH) && differs(reading))
             }
             Kind::Clamping | Kind::Motion => radial().count() > 0,
-            Kind::RunOut | Kind::PickUp => radial().any(|reading| reading.sensor == target && beside(reading, 2)),
+            Kind::RunOut => radial().any(|reading| reading.sensor == target && beside(reading, 2)),
+            // Of two sensors at right angles, each one's is a motion.
+            Kind::PickUp => radial().any(|reading| reading.sensor == target && beside(reading, ENOUGH)),
         }
     }
 
