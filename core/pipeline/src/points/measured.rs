@@ -13,6 +13,8 @@ const STRETCH: usize = 8;
 const COARSE_STRETCH: usize = 40;
 /// A resolution is coarse from this share of the range on.
 const COARSE: f64 = 1e-3;
+/// Part of the last digit by which readings may be off it.
+const ON_GRID: f64 = 1e-3;
 /// Rows that are copies matter from this share of all on.
 const MATTERS: f64 = 0.1;
 /// Numbers beyond this are nothing that was measured, in any unit; sums of their squares leave the range of numbers.
@@ -90,25 +92,18 @@ fn copied(name: &str, values: &[f64]) -> Option<Check> {
         _ => return None,
     };
     let share = copies.max(doubled) as f64 / count as f64;
-    let found = || format!("{words}: they are copies, which show no noise; leave them out");
+    let found = || format!("{words}: they are copies, or without noise, and show none; leave copies out");
     Some(Check::new(Test::Measured, name, share, &[], 0.0).finding(found))
 }
 
-/// Whether the smallest step between readings is coarse beside their range.
+/// Whether readings are written with few digits beside their range, or are of one or two numbers.
 fn is_coarse(values: &[f64]) -> bool {
     let mut sorted: Vec<f64> = values.iter().copied().filter(|value| value.is_finite()).collect();
     sorted.sort_by(f64::total_cmp);
     sorted.dedup();
-    // A column of one or two numbers has no resolution.
-    if sorted.len() < 3 {
-        return true;
-    }
-    let range = sorted.last().zip(sorted.first()).map_or(0.0, |(last, first)| last - first);
-    // The tenth part of the steps: two readings may come near to each other by chance.
-    let mut steps: Vec<f64> = sorted.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    steps.sort_by(f64::total_cmp);
-    let even = steps.first().zip(steps.get(steps.len() / 2)).is_some_and(|(least, middle)| middle < &(1.5 * least));
-    even && steps.first().is_some_and(|step| *step > COARSE * range)
+    let [low, _, .., high] = sorted[..] else { return true };
+    let digit = 10_f64.powf((COARSE * (high - low)).log10().ceil());
+    sorted.iter().all(|value| (value / digit - (value / digit).round()).abs() < ON_GRID)
 }
 
 /// Columns that the method needs and that hold one number, where others vary.
@@ -176,6 +171,8 @@ mod tests {
             Points { columns: vec![Column { name: "dx_mm".into(), values: vec![0.1, -1e300] }], ..Points::default() };
         let refused = refuse_impossible(&impossible).unwrap_err().to_string();
         assert!(refused.contains("`dx_mm` is -1e300 in row 2"), "{refused}");
+        // The same of a grid of which few places are taken.
+        assert_eq!(findings(|row| ((row % 20) * 37 % 191) as f64 * 1e-3, sound, 40), [""; 0]);
         let dead = findings(reading, |_| 0.0123, 200);
         assert!(dead.len() == 1 && dead[0].contains("`dz_mm` is 0.0123 in every row"), "{dead:?}");
         assert_eq!(findings(|_| 0.0, |_| 0.0, 200), [""; 0]);
