@@ -22,7 +22,7 @@ use std::{
     io::{self, ErrorKind, IsTerminal, Write},
 };
 
-pub(crate) use runout_core::table::number::{self, unit_text as unit};
+pub(crate) use runout_core::numerics::number::{self, unit_text as unit};
 use serde::Serialize;
 pub(crate) use wrap::columns;
 

@@ -1,7 +1,10 @@
 //! Groups that have one noise level: orders, components, places, sensors. Too little is a finding too: a constant component, copied
 //! rows, smoothed readings.
 
-use runout_numerics::statistics::{chi2_above_and_below, f_tail};
+use runout_numerics::{
+    number::significant,
+    statistics::{chi2_above_and_below, f_tail},
+};
 
 use crate::check::{Check, FINDING, Test};
 
@@ -98,7 +101,11 @@ pub fn said(what: &str, groups: &[Group], mut all: Vec<Compared>, level: Level, 
             if one.ratio > 1.0 {
                 format!("{name} has {size:.1} times the residual of {others} (of {} {what})", all.len())
             } else {
-                format!("{name} has only {size:.2e} times the residual of {others} (of {} {what}): {why}", all.len())
+                format!(
+                    "{name} has only {} times the residual of {others} (of {} {what}): {why}",
+                    significant(size, 2),
+                    all.len()
+                )
             }
         })
     });

@@ -2,7 +2,7 @@
 //! freedom as there are readings.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
-use runout_numerics::statistics::chi2_above_and_below;
+use runout_numerics::{number::significant, statistics::chi2_above_and_below};
 
 use crate::check::{Check, Test};
 
@@ -59,8 +59,9 @@ pub fn left_out(components: &[LeftOut]) -> Vec<Check> {
                 format!("{} of regions left out is predicted {size:.2} times worse than its uncertainty says", one.name)
             } else {
                 format!(
-                    "{} of regions left out is predicted with {size:.2e} of its uncertainty: it is stated too large",
-                    one.name
+                    "{} of regions left out is predicted with {} of its uncertainty: it is stated too large",
+                    one.name,
+                    significant(size, 2)
                 )
             }
         });

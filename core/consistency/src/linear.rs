@@ -2,6 +2,7 @@
 
 use runout_numerics::{
     least_squares::{Basis, dot},
+    number::significant,
     statistics::f_tail,
 };
 
@@ -237,7 +238,8 @@ pub fn residual(chi2_per_dof: f64, dof: f64, noise_dof: f64) -> Check {
     // Uncertainties are too large then, so that values hold.
     let words = || {
         format!(
-            "the residual is only {size:.2e} times the noise: the noise is stated too large, or readings are smoothed or copied"
+            "the residual is only {} times the noise: the noise is stated too large, or readings are smoothed or copied",
+            significant(size, 2)
         )
     };
     check.finding(words).named()

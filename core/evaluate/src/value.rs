@@ -5,7 +5,7 @@ pub mod own;
 use std::fmt;
 
 use runout_draws::Uncertainty;
-use runout_table::number::ROUNDING;
+use runout_numerics::number::ROUNDING;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

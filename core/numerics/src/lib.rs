@@ -10,6 +10,7 @@ pub mod interpolation;
 pub mod lanes;
 pub mod least_squares;
 pub mod moderated;
+pub mod number;
 pub mod side_by_side;
 pub mod statistics;
 pub mod stretches;

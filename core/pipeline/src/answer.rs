@@ -5,7 +5,7 @@ mod verdict;
 
 use crate::summary::Summary;
 use runout_closed_loop::diagnosis::{Added, Diagnosis};
-use runout_table::number::{significant, unit_text, with_std};
+use runout_numerics::number::{significant, unit_text, with_std};
 
 pub use key_values::{KeyValue, Number};
 pub use verdict::{Judgement, Verdict, limit_text};

@@ -18,7 +18,6 @@
 
 pub mod circles;
 pub mod figure;
-pub mod number;
 pub mod panels;
 
 use std::{collections::HashMap, sync::Arc};

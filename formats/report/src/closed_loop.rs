@@ -3,7 +3,7 @@
 use maud::{Markup, html};
 use runout_core::{
     model::diagnosis::{Added, Diagnosis, Estimated, Level, Moved, Unexplained},
-    table::number::{significant, with_std},
+    numerics::number::{significant, with_std},
 };
 
 use crate::symbol;

@@ -2,10 +2,10 @@
 
 use maud::{Markup, html};
 use runout_core::{
+    numerics::number::{ranges, rounded_place, significant},
     rig::Rig,
     summary::Summary,
     surface::Surface,
-    table::number::{ranges, rounded_place, significant},
 };
 
 /// Facts of the part and the measurement, where there are any.

@@ -3,8 +3,8 @@
 use maud::{Markup, html};
 use runout_core::{
     answer::{Answer, Judgement, KeyValue, Number},
+    numerics::number::{ranges, significant, with_std},
     summary::{LimitSummary, Summary},
-    table::number::{ranges, significant, with_std},
 };
 
 use crate::{limits, symbol};

@@ -3,8 +3,8 @@
 use maud::{Markup, html};
 use runout_core::{
     answer::limit_text,
+    numerics::number::significant,
     summary::{Decision, Limit, LimitSummary, LimitValue},
-    table::number::significant,
 };
 
 use crate::symbol;

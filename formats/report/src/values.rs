@@ -4,8 +4,8 @@ use std::collections::HashMap;
 
 use runout_core::{
     draws::Uncertainty,
+    numerics::number::{significant, with_std},
     summary::{PlacedValue, Summary},
-    table::number::{significant, with_std},
 };
 use serde::Serialize;
 
@@ -148,7 +148,9 @@ fn row(placed: PlacedValue) -> Row {
         },
         remark: format!(
             "{lacks}{}{}",
-            value.raised_by_noise.map_or_else(String::new, |by| format!("raised by noise, by {by:.2e}; ")),
+            value
+                .raised_by_noise
+                .map_or_else(String::new, |by| format!("raised by noise, by {}; ", significant(by, 2))),
             reason(value.refuted_by.as_ref())
         ),
         about: format!("{}{band}", value.source),

@@ -5,7 +5,7 @@ use runout_core::{
     fault::Fault,
     height_grid::GridPlaces,
     model::{Fit, Model, Setting},
-    numerics::least_squares::dot,
+    numerics::{least_squares::dot, number::significant},
     pipeline::{Context, StageConfig},
     points::{PointColumn, PointKind::Number, Points},
     stage::{EvaluableKind, Outcome, PointModel, PointSeparator, Separator, far_below_noise},
@@ -189,8 +189,10 @@ pub(crate) fn too_smooth(heights: &Heights, config: &FlyCuttingConfig) -> Option
     let sq_nm = (dot(&left, &left) / heights.len().max(1) as f64).sqrt();
     (sq_nm < TOO_SMOOTH * scallop_nm).then(|| {
         format!(
-            "Sq of the map is {sq_nm:.2e} nm, and the scallops of the declared cut alone have {scallop_nm:.2e} nm: no tool leaves a smoother \
-             surface. Is `height_nm` in µm or mm, or is the feed smaller?"
+            "Sq of the map is {} nm, and the scallops of the declared cut alone have {} nm: no tool leaves a smoother \
+             surface. Is `height_nm` in µm or mm, or is the feed smaller?",
+            significant(sq_nm, 3),
+            significant(scallop_nm, 3)
         )
     })
 }

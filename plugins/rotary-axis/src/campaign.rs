@@ -4,6 +4,7 @@ use nalgebra::Vector3;
 use runout_core::{
     Error, Result,
     fault::known_names,
+    numerics::number::significant,
     points::{
         PointColumn,
         PointKind::{Label, Number},
@@ -343,7 +344,7 @@ fn looks_wrong(axis: Axis, command: &[f64], deviations: [&[f64]; 3]) -> Vec<Stri
     if median > LARGE_MM {
         warnings.push(format!("half of the deviations are above {median:.1} mm: are they in µm?"));
     } else if most > 0.0 && most < SMALL_MM {
-        warnings.push(format!("no deviation is above {most:.1e} mm: are they in m?"));
+        warnings.push(format!("no deviation is above {} mm: are they in m?", significant(most, 2)));
     }
     warnings
 }

@@ -3,6 +3,7 @@
 use runout_core::{
     Result,
     fault::{Fault, within},
+    numerics::number::significant,
     pipeline::{Context, StageConfig},
     points::{PointColumn, Points},
     stage::{Outcome, PointSeparator, Separator},
@@ -147,9 +148,9 @@ impl Solution {
         if self.rigid > 0 {
             remarks.push(format!(
                 "{} motions of the whole rotor as a rigid body have no natural frequency at rest and are left out, like everything \
-                 below {:.2e} Hz",
+                 below {} Hz",
                 self.rigid,
-                hertz(self.standstill)
+                significant(hertz(self.standstill), 2)
             ));
         }
         if self.overdamped > 0 {
@@ -160,16 +161,16 @@ impl Solution {
         }
         if let Some((number, mode)) = unstable(&self.at_rest) {
             remarks.push(format!(
-                "mode {number} grows by itself at rest (damping ratio {:.2e}): check the cross-coupling of the bearings",
-                mode.damping_ratio()
+                "mode {number} grows by itself at rest (damping ratio {}): check the cross-coupling of the bearings",
+                significant(mode.damping_ratio(), 2)
             ));
         }
         if let Some((speed, number, mode)) =
             self.campbell.iter().find_map(|(speed, modes)| unstable(modes).map(|(number, mode)| (speed, number, mode)))
         {
             remarks.push(format!(
-                "mode {number} grows by itself at {speed} rpm (damping ratio {:.2e})",
-                mode.damping_ratio()
+                "mode {number} grows by itself at {speed} rpm (damping ratio {})",
+                significant(mode.damping_ratio(), 2)
             ));
         }
         if self.at_rest.len() < config.modes {

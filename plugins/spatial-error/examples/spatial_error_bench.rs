@@ -26,7 +26,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let covariance =
         Covariance { family: Family::Gaussian, sill_um: 1.0, range_mm: [range; 3], nugget_um: nugget.sqrt() };
     for (trend, columns) in [("zero", 0), ("fitted", 1)] {
-        let observed = Observed { mean_um: values.clone(), noise_um2: vec![0.0; count], share: vec![1.0; count] };
+        let observed =
+            Observed { mean_um: values.clone(), noise_um2: vec![0.0; count], share: vec![1.0; count], shared: None };
         let design = vec![faer::Mat::from_fn(count, columns, |_, _| 1.0)];
         let data = Data { places: places.clone(), observed: vec![observed], design, within: None };
         let joint = Joint::new(&data, &[covariance]).ok_or("the covariance is not positive definite")?;

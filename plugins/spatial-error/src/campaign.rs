@@ -12,24 +12,16 @@ use runout_core::{
 
 pub(crate) use crate::measured::COMPONENTS;
 use crate::{
+    correlated::{Correlated, SharedErrors},
     joint::{Data, Observed, Within},
-    measured::Measured,
-    noise::{Noise, of_repeats},
+    measured::{Measured, looks_wrong},
+    noise::{Noise, Repeats},
     span::Span,
     terms::{Term, Volume},
 };
 
 /// Commands that differ by less than this, in mm, are one place.
 const SAME_MM: f64 = 1e-6;
-/// A median deviation above this, in µm, looks like another unit.
-const LARGE_UM: f64 = 2000.0;
-/// The largest deviation below this, in µm, looks like another unit.
-const SMALL_UM: f64 = 0.02;
-
-/// The same as a share of the extent of the places.
-const SMALL_SHARE: f64 = 2e-6;
-/// Share of the other components below which the largest deviation of one looks like another unit.
-const UNLIKE: f64 = 0.01;
 
 /// Columns of a campaign.
 pub(crate) const COLUMNS: [PointColumn; 9] = [
@@ -83,6 +75,8 @@ pub struct Campaign {
     pub repeat: Vec<usize>,
     /// What is known of the noise.
     pub noise: Noise,
+    /// Errors of each component that depend on each other in time.
+    pub correlated: [Option<Correlated>; 3],
     /// The measured volume.
     pub volume: Volume,
     /// The line, plane or space that the places span.
@@ -145,11 +139,20 @@ impl Campaign {
         }
         let mut remarks = looks_wrong(&rows, &readings_um, &measured);
         remarks.extend(points.copies());
-        let noise = match (stated, std_um) {
+        let repeats = Repeats::of(&place_of, places_mm.len(), &readings_um, &measured, &time);
+        let mut noise = match (stated, std_um) {
             (Some(stated), _) => Noise::Column(stated.to_vec()),
             (None, Some(std_um)) => Noise::Stated(std_um),
-            (None, None) => of_repeats(&place_of, places_mm.len(), &readings_um, &measured, &time),
+            (None, None) => repeats.as_ref().map_or(Noise::Unknown, |repeats| repeats.noise(&measured)),
         };
+        let mut correlated = [None; 3];
+        for (field, axis) in measured.iter().enumerate().filter(|_| noise != Noise::Unknown) {
+            correlated[*axis] = repeats.as_ref().and_then(|repeats| repeats.correlated(field, &time));
+            if let (Some(found), Noise::Repeats { std_um, .. }) = (&correlated[*axis], &mut noise) {
+                std_um[*axis] = found.independent_um2.sqrt();
+            }
+            checks.extend(correlated[*axis].map(|found| found.check(COMPONENTS[*axis], measured.len())));
+        }
         if place_of.len() > places_mm.len() && noise == Noise::Unknown {
             remarks.push(format!(
                 "{} readings are at a place that was read before; they are too few, or copies, and do not give the noise: readings of \
@@ -170,6 +173,7 @@ impl Campaign {
             timed,
             repeat,
             noise,
+            correlated,
             volume,
             span,
             remarks,
@@ -260,12 +264,15 @@ impl Campaign {
                     }
                 }
             }
+            // Only what changes slowly in time is fitted to the differences within places.
+            let spacing = (self.place_of.len().max(2) as f64 - 1.0).recip();
+            let slowly_um2 = self.correlated[axis].map_or(0.0, |found| found.slowly_um2(spacing));
             for (row, place) in self.place_of.iter().enumerate().filter(|_| known) {
                 let index = position[*place];
                 if index == usize::MAX || repeats[index] < 2 {
                     continue;
                 }
-                let weight = self.variance_um2(row, axis).map_or(1.0, f64::recip);
+                let weight = self.variance_um2(row, axis).map_or(1.0, |variance| (variance + slowly_um2).recip());
                 let reading = self.readings_um[row][axis] - mean_um[index];
                 let left: Vec<f64> =
                     moving.iter().map(|column| at(row, axis, terms[*column]) - means[(index, *column)]).collect();
@@ -280,11 +287,24 @@ impl Campaign {
             within.dof += repeats.iter().map(|repeats| repeats.saturating_sub(1)).sum::<usize>();
             let share = repeats.iter().map(|repeats| if known { 1.0 } else { 1.0 / *repeats as f64 }).collect();
             let noise_um2 = weights.iter().map(|weight| if known { 1.0 / weight } else { 0.0 }).collect();
-            observed.push(Observed { mean_um, noise_um2, share });
+            let shared = self.correlated[axis].map(|of| self.shared(of, axis, &position, &weights));
+            observed.push(Observed { mean_um, noise_um2, share, shared });
             design.push(means);
         }
         let within = (known && within.dof > 0).then_some(within);
         Data { places, observed, design, within }
+    }
+
+    /// Errors that means of places share: `position` of each place among them, and sums of the weights of their readings.
+    fn shared(&self, of: Correlated, axis: usize, position: &[usize], weights: &[f64]) -> SharedErrors {
+        let mut readings = vec![Vec::new(); weights.len()];
+        for (row, place) in self.place_of.iter().enumerate() {
+            if let Some(own) = readings.get_mut(position[*place]) {
+                let weight = self.variance_um2(row, axis).map_or(1.0, f64::recip);
+                own.push((self.time[row], weight / weights[position[*place]]));
+            }
+        }
+        SharedErrors { of, readings }
     }
 }
 
@@ -319,51 +339,4 @@ fn scaled(time: Option<&[f64]>, count: usize) -> Vec<f64> {
     let first = time.iter().copied().fold(f64::INFINITY, f64::min);
     let last = time.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     time.iter().map(|at| if last > first { (at - first) / (last - first) } else { 0.0 }).collect()
-}
-
-fn looks_wrong(places: &[[f64; 3]], readings_um: &[[f64; 3]], measured: &[usize]) -> Vec<String> {
-    let mut remarks = Vec::new();
-    let sizes_of = |axis: usize| readings_um.iter().map(move |reading| reading[axis].abs());
-    let mut sizes: Vec<f64> = measured.iter().flat_map(|axis| sizes_of(*axis)).collect();
-    sizes.sort_by(f64::total_cmp);
-    let median = sizes[sizes.len() / 2];
-    let largest = sizes.last().copied().unwrap_or(0.0);
-    if median > LARGE_UM {
-        remarks.push(format!(
-            "the median deviation is {median:.0} µm: are `dx_um`, `dy_um`, `dz_um` in nm or places themselves?"
-        ));
-    }
-    let extent = (0..3)
-        .map(|axis| {
-            let each = || places.iter().map(|place| place[axis]);
-            each().fold(f64::NEG_INFINITY, f64::max) - each().fold(f64::INFINITY, f64::min)
-        })
-        .fold(0.0, f64::max);
-    // No machine is as good as that over its travel, and a tracker is not placed so well.
-    let small_um = SMALL_UM.max(SMALL_SHARE * extent * 1e3);
-    let of_column = |axis: usize| sizes_of(axis).fold(0.0, f64::max);
-    if largest > 0.0 && largest < small_um {
-        remarks.push(format!(
-            "the largest deviation is {largest:.2e} µm over {extent:.0} mm: are `dx_um`, `dy_um`, `dz_um` in mm?"
-        ));
-    } else {
-        for axis in measured.iter().copied() {
-            let own = of_column(axis);
-            let others = measured.iter().filter(|other| **other != axis).map(|other| of_column(*other));
-            let others = others.fold(f64::INFINITY, f64::min);
-            if own > 0.0 && own < small_um && own < UNLIKE * others {
-                remarks.push(format!(
-                    "`{}_um` is {own:.2e} µm at most, and the other components are {others:.1} µm or more: is it in mm?",
-                    COMPONENTS[axis]
-                ));
-            }
-        }
-    }
-    if extent > 0.0 && extent < 10.0 && largest > 1.0 {
-        remarks.push(format!("all places are within {extent:.3} mm: are `x_mm`, `y_mm`, `z_mm` in m?"));
-    }
-    if extent > 50_000.0 {
-        remarks.push(format!("the places are {extent:.0} mm apart: are `x_mm`, `y_mm`, `z_mm` in µm?"));
-    }
-    remarks
 }

@@ -15,7 +15,7 @@ use runout_core::{
 use crate::{
     campaign::{COMPONENTS, Campaign},
     config::Kriging,
-    noise::{Noise, of_repeats},
+    noise::{Noise, Repeats},
     projections::Projections,
     residual::residual_um,
     rough::Rough,
@@ -60,8 +60,9 @@ fn of_stated_noise(campaign: &Campaign) -> Vec<Check> {
         return Vec::new();
     }
     let (places, readings) = (&campaign.place_of, &campaign.readings_um);
-    let known = of_repeats(places, campaign.places_mm.len(), readings, &campaign.measured, &campaign.time);
-    let Noise::Repeats { std_um, dof } = known else { return Vec::new() };
+    let repeats = Repeats::of(places, campaign.places_mm.len(), readings, &campaign.measured, &campaign.time);
+    let known = repeats.map(|repeats| repeats.noise(&campaign.measured));
+    let Some(Noise::Repeats { std_um, dof }) = known else { return Vec::new() };
     let group = |axis: &usize| {
         let squares = dof as f64 * (std_um[*axis] / campaign.noise_um(*axis)).powi(2);
         Group { name: format!("{}, scatter of repeats", COMPONENTS[*axis]), squares, freedom: dof as f64 }
@@ -117,7 +118,10 @@ fn of_repeated(campaign: &Campaign, residual: &[[f64; 3]], axis: usize) -> Vec<C
     let mut members = vec![Vec::new(); campaign.places_mm.len()];
     campaign.place_of.iter().enumerate().for_each(|(row, place)| members[*place].push(row));
     members.retain(|rows| rows.len() > 1);
-    let members: Vec<&Vec<usize>> = members.iter().step_by(members.len().div_ceil(COMPARED).max(1)).collect();
+    // Errors that depend on each other are compared with their covariance: of fewer places.
+    let correlated = campaign.correlated[axis].is_some();
+    let compared = if correlated { COMPARED / 2 } else { COMPARED };
+    let members: Vec<&Vec<usize>> = members.iter().step_by(members.len().div_ceil(compared).max(1)).collect();
     let rows: Vec<usize> = members.iter().flat_map(|rows| rows.iter().copied()).collect();
     // What a place reads in the mean is fitted.
     let (mut means, mut left) = (Vec::new(), Vec::with_capacity(rows.len()));
@@ -132,10 +136,15 @@ fn of_repeated(campaign: &Campaign, residual: &[[f64; 3]], axis: usize) -> Vec<C
     let structure = structure(campaign, &members, &rows);
     let basis = Basis::of(means);
     let fit = LinearFit { residual: &left, basis: basis.columns(), names: &[], weights: &[], noise: None, unit: "µm" };
+    let structure = if correlated {
+        structure.along("time", vec![0; rows.len()], rows.iter().map(|row| campaign.time[*row]).collect())
+    } else {
+        structure
+    };
     let checks = judge(fit, &structure).checks.into_iter();
     // Which of two readings of a place is the bad one is not known.
     checks
-        .filter(|check| check.test != Test::Rows)
+        .filter(|check| !matches!(check.test, Test::Rows | Test::Order))
         .map(|check| check.among(campaign.measured.len()).within(COMPONENTS[axis]))
         .collect()
 }

@@ -9,17 +9,16 @@
 mod values;
 mod volumetric;
 
-use faer::Mat;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use runout_core::component_curves::{Carries, Location, Node, symbols};
 
 use crate::{
     campaign::Campaign,
     config::{Curves, SpatialErrorConfig},
-    joint::{Posterior, Query},
     likelihood::{Criterion, estimate},
     solve::{Found, Solution, complete, independent, prior},
     terms::{Between, Term, Volume},
+    whole::Whole,
 };
 pub(crate) use values::Volumetric;
 
@@ -162,42 +161,6 @@ fn places(campaign: &Campaign) -> Vec<[f64; 3]> {
         return all;
     }
     campaign.places_mm.iter().copied().take(PLACES).collect()
-}
-
-/// The predicted error of all measured components at all places, and its covariance.
-struct Whole {
-    mean_um: DVector<f64>,
-    covariance: Mat<f64>,
-}
-
-impl Whole {
-    fn new(campaign: &Campaign, fitted: &Solution, places: &[[f64; 3]], factors: [f64; 3]) -> Self {
-        let nugget_counts = Solution::nugget_counts(campaign);
-        let fields: Vec<(usize, Posterior)> = (fitted.measured.iter().enumerate())
-            .map(|(field, axis)| {
-                let design = fitted.design(campaign, places, *axis);
-                (*axis, fitted.joint.posterior(field, &Query { places, design: design.as_ref(), nugget_counts }))
-            })
-            .collect();
-        let (count, columns) = (places.len(), fitted.terms.len());
-        let total = count * fields.len();
-        let trend = Mat::from_fn(columns, columns, |row, column| fitted.joint.trend_covariance[(row, column)]);
-        let by_trend =
-            Mat::from_fn(total, columns, |row, column| fields[row / count].1.by_trend[(row % count, column)]);
-        let mut covariance = &by_trend * &trend * by_trend.transpose();
-        for (field, (_, posterior)) in fields.iter().enumerate() {
-            for column in 0..count {
-                for row in 0..count {
-                    covariance[(field * count + row, field * count + column)] += posterior.own[(row, column)];
-                }
-            }
-        }
-        let factor = |row: usize| factors[fields[row / count].0];
-        let covariance =
-            Mat::from_fn(total, total, |row, column| factor(row) * factor(column) * covariance[(row, column)]);
-        let mean_um = DVector::from_fn(total, |row, _| fields[row / count].1.mean_um[row % count]);
-        Self { mean_um, covariance }
-    }
 }
 
 /// Directions of the columns that displace no reading.

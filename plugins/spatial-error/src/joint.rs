@@ -17,7 +17,10 @@ use faer::{
 };
 use nalgebra::{Cholesky, DMatrix, DVector};
 
-use crate::correlation::{Family, Scaled};
+use crate::{
+    correlated::SharedErrors,
+    correlation::{Family, Scaled},
+};
 
 /// A stationary covariance: s²R(d) + n² at one place, d scaled by the range of each axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -41,6 +44,16 @@ pub struct Observed {
     pub noise_um2: Vec<f64>,
     /// Share of n² in their variance: 1 where the noise is known and n is real variation, else 1/count.
     pub share: Vec<f64>,
+    /// Errors that the means share, where they depend on each other in time.
+    pub shared: Option<SharedErrors>,
+}
+
+impl Observed {
+    /// Variance of the noise of a mean, with what it shares with others, in µm².
+    #[must_use]
+    pub(crate) fn variance_um2(&self, place: usize) -> f64 {
+        self.noise_um2[place] + self.shared.as_ref().map_or(0.0, |shared| shared.covariance_um2(place, place))
+    }
 }
 
 /// Scatter of repeats within places, weighted by the noise: what it adds to the sums of the trend.
@@ -125,6 +138,9 @@ pub(crate) fn matrix(covariance: &Covariance, cloud: &Scaled, observed: &Observe
             covariance.family.correlations(cloud.from(column), sill, cloud.at(column), below);
         }
         all[(column, column)] = sill + nugget * observed.share[column] + observed.noise_um2[column];
+        if let Some(shared) = &observed.shared {
+            (column..count).for_each(|row| all[(row, column)] += shared.covariance_um2(row, column));
+        }
     }
     all
 }

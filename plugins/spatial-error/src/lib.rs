@@ -9,6 +9,7 @@ mod checks;
 mod compensate;
 mod conclusion;
 mod config;
+mod correlated;
 mod correlation;
 mod curves;
 mod diagnose;
@@ -40,6 +41,7 @@ mod trace;
 mod trend;
 mod values;
 mod variogram;
+mod whole;
 
 use runout_core::pipeline::{Plugin, Registry};
 

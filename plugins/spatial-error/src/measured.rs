@@ -7,9 +7,18 @@ use nalgebra::DVector;
 use runout_core::{
     Error, Result,
     consistency::{Check, Test},
+    numerics::number::significant,
     points::Points,
 };
 
+/// A median deviation above this, in µm, looks like another unit.
+const LARGE_UM: f64 = 2000.0;
+/// The largest deviation below this, in µm, looks like another unit.
+const SMALL_UM: f64 = 0.02;
+/// The same as a share of the extent of the places.
+const SMALL_SHARE: f64 = 2e-6;
+/// Share of the other components below which the largest deviation of one looks like another unit.
+const UNLIKE: f64 = 0.01;
 /// Components of the error.
 pub(crate) const COMPONENTS: [&str; 3] = ["dx", "dy", "dz"];
 /// Share of the largest residual beside a plane below which a component is not measured.
@@ -52,9 +61,10 @@ impl Measured {
                     let share = residual[axis] / largest;
                     let check = Check::new(Test::Measured, component, share * share, &[], 0.0).finding(|| {
                         format!(
-                            "`{component}_um` varies by {:.1e} µm beside a plane over the places, {share:.1e} of the other components: it counts \
+                            "`{component}_um` varies by {} µm beside a plane over the places, {} of the other components: it counts \
                              as not measured, and is not predicted and not compensated",
-                            residual[axis]
+                            significant(residual[axis], 2),
+                            significant(share, 2)
                         )
                     });
                     checks.push(check.named());
@@ -101,4 +111,54 @@ fn beside(values: &[f64], plane: &[DVector<f64>]) -> f64 {
     let mut left = DVector::from_column_slice(values);
     take_out(&mut left, plane);
     left.norm() / (values.len().max(1) as f64).sqrt()
+}
+
+/// What looks like another unit.
+pub(crate) fn looks_wrong(places: &[[f64; 3]], readings_um: &[[f64; 3]], measured: &[usize]) -> Vec<String> {
+    let mut remarks = Vec::new();
+    let sizes_of = |axis: usize| readings_um.iter().map(move |reading| reading[axis].abs());
+    let mut sizes: Vec<f64> = measured.iter().flat_map(|axis| sizes_of(*axis)).collect();
+    sizes.sort_by(f64::total_cmp);
+    let median = sizes[sizes.len() / 2];
+    let largest = sizes.last().copied().unwrap_or(0.0);
+    if median > LARGE_UM {
+        remarks.push(format!(
+            "the median deviation is {median:.0} µm: are `dx_um`, `dy_um`, `dz_um` in nm or places themselves?"
+        ));
+    }
+    let extent = (0..3)
+        .map(|axis| {
+            let each = || places.iter().map(|place| place[axis]);
+            each().fold(f64::NEG_INFINITY, f64::max) - each().fold(f64::INFINITY, f64::min)
+        })
+        .fold(0.0, f64::max);
+    // No machine is as good as that over its travel, and a tracker is not placed so well.
+    let small_um = SMALL_UM.max(SMALL_SHARE * extent * 1e3);
+    let of_column = |axis: usize| sizes_of(axis).fold(0.0, f64::max);
+    if largest > 0.0 && largest < small_um {
+        remarks.push(format!(
+            "the largest deviation is {} µm over {extent:.0} mm: are `dx_um`, `dy_um`, `dz_um` in mm?",
+            significant(largest, 2)
+        ));
+    } else {
+        for axis in measured.iter().copied() {
+            let own = of_column(axis);
+            let others = measured.iter().filter(|other| **other != axis).map(|other| of_column(*other));
+            let others = others.fold(f64::INFINITY, f64::min);
+            if own > 0.0 && own < small_um && own < UNLIKE * others {
+                remarks.push(format!(
+                    "`{}_um` is {} µm at most, and the other components are {others:.1} µm or more: is it in mm?",
+                    COMPONENTS[axis],
+                    significant(own, 2)
+                ));
+            }
+        }
+    }
+    if extent > 0.0 && extent < 10.0 && largest > 1.0 {
+        remarks.push(format!("all places are within {extent:.3} mm: are `x_mm`, `y_mm`, `z_mm` in m?"));
+    }
+    if extent > 50_000.0 {
+        remarks.push(format!("the places are {extent:.0} mm apart: are `x_mm`, `y_mm`, `z_mm` in µm?"));
+    }
+    remarks
 }

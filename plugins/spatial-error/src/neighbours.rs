@@ -73,7 +73,7 @@ impl Neighbours {
                 let design = DVector::from_fn(data.columns(), |column, _| data.design[field][(index, column)]);
                 let found = local.predict(&near, place, &design, false);
                 let observed = &data.observed[field];
-                let own = covariance.nugget_um.powi(2) * observed.share[index] + observed.noise_um2[index];
+                let own = covariance.nugget_um.powi(2) * observed.share[index] + observed.variance_um2(index);
                 LeftOut {
                     residual_um: observed.mean_um[index] - found.mean_um,
                     std_um: (found.variance_um2 + own).sqrt(),
@@ -95,8 +95,12 @@ impl Local<'_> {
         let places: Vec<[f64; 3]> = near.iter().map(|index| self.data.places[*index]).collect();
         let observed = &self.data.observed[self.field];
         let of = |values: &[f64]| near.iter().map(|index| values[*index]).collect::<Vec<f64>>();
-        let part =
-            Observed { mean_um: of(&observed.mean_um), noise_um2: of(&observed.noise_um2), share: of(&observed.share) };
+        let part = Observed {
+            mean_um: of(&observed.mean_um),
+            noise_um2: of(&observed.noise_um2),
+            share: of(&observed.share),
+            shared: observed.shared.as_ref().map(|shared| shared.some(near)),
+        };
         let cloud = Scaled::of(&places, self.covariance.range_mm);
         let Some(lower) = factor(&matrix(self.covariance, &cloud, &part)) else { return Predicted::LOST };
         let columns = design.len();

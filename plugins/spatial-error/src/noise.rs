@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 use runout_core::numerics::statistics::f_tail;
 
-use crate::terms::legendre;
+use crate::{correlated::Correlated, terms::legendre};
 
 /// What is known of the noise.
 #[derive(Debug, Clone, PartialEq)]
@@ -34,76 +34,120 @@ const STEPS: usize = 200;
 const STEP_CHANCE: f64 = 1e-6;
 /// Scatter below this share of the deviations is that of copied rows.
 const COPIED: f64 = 1e-9;
+/// Readings at most that show how errors depend on each other in time.
+const FOLLOWED: usize = 200;
 
-/// Noise of repeats of places, of the measured components.
-#[must_use]
-pub(crate) fn of_repeats(
-    place_of: &[usize],
-    places: usize,
-    readings_um: &[[f64; 3]],
-    measured: &[usize],
-    time: &[f64],
-) -> Noise {
-    let mut members = vec![Vec::new(); places];
-    place_of.iter().enumerate().for_each(|(row, place)| members[*place].push(row));
-    members.retain(|rows| rows.len() > 1);
-    let rows: Vec<usize> = members.iter().flatten().copied().collect();
-    let free = rows.len() - members.len();
-    if free < FEWEST[0] {
-        return Noise::Unknown;
-    }
-    let orders = ORDERS[0].min(free / ORDERS[1]);
-    let fields = measured.len();
-    let function = |row: usize, column: usize| match measured.get(column) {
-        Some(axis) => readings_um[row][*axis],
-        None => legendre(column + 1 - fields, 2.0 * time[row] - 1.0),
-    };
-    let mut all = DMatrix::<f64>::zeros(rows.len(), fields + orders);
-    let mut at = 0;
-    for group in &members {
-        for column in 0..fields + orders {
-            let mean = group.iter().map(|row| function(*row, column)).sum::<f64>() / group.len() as f64;
-            for (index, row) in group.iter().enumerate() {
-                all[(at + index, column)] = function(*row, column) - mean;
-            }
+/// Readings of places that were read more than once: what they differ by within a place, after a drift and a step that are common to all.
+pub(crate) struct Repeats {
+    /// Readings of each place.
+    members: Vec<Vec<usize>>,
+    /// What is left of each measured component, place by place.
+    left: Vec<DVector<f64>>,
+    /// Drift and step, orthonormal.
+    basis: Vec<DVector<f64>>,
+    /// Degrees of freedom of a component.
+    dof: usize,
+    /// Sum of squares of all readings.
+    size_um2: f64,
+}
+
+impl Repeats {
+    /// Of the measured components; `None` where they are too few.
+    #[must_use]
+    pub(crate) fn of(
+        place_of: &[usize],
+        places: usize,
+        readings_um: &[[f64; 3]],
+        measured: &[usize],
+        time: &[f64],
+    ) -> Option<Self> {
+        let mut members = vec![Vec::new(); places];
+        place_of.iter().enumerate().for_each(|(row, place)| members[*place].push(row));
+        members.retain(|rows| rows.len() > 1);
+        let rows: Vec<usize> = members.iter().flatten().copied().collect();
+        let free = rows.len() - members.len();
+        if free < FEWEST[0] {
+            return None;
         }
-        at += group.len();
-    }
-    // The drift's functions, orthonormal.
-    let mut basis: Vec<DVector<f64>> = Vec::new();
-    for column in fields..fields + orders {
-        basis.extend(outside(all.column(column).into_owned(), &basis));
-    }
-    let left = |field: usize, basis: &[DVector<f64>]| without(all.column(field).into_owned(), basis);
-    let before: Vec<DVector<f64>> = (0..fields).map(|field| left(field, &basis)).collect();
-    let sizes: Vec<usize> = members.iter().map(Vec::len).collect();
-    let times: Vec<f64> = rows.iter().map(|row| time[*row]).collect();
-    basis.extend(step(&before, &sizes, &times, &basis, free));
-    let dof = free.saturating_sub(basis.len());
-    if dof < FEWEST[0] {
-        return Noise::Unknown;
-    }
-    let mut squares = vec![0.0; fields];
-    for (field, squares) in squares.iter_mut().enumerate() {
-        *squares = left(field, &basis).norm_squared();
-    }
-    let size: f64 = readings_um.iter().flatten().filter(|value| value.is_finite()).map(|value| value * value).sum();
-    let copied = |squares: f64| squares <= COPIED * COPIED * size;
-    if copied(squares.iter().sum()) {
-        return Noise::Unknown;
-    }
-    let mut std_um = [f64::NAN; 3];
-    for (axis, own) in measured.iter().zip(&squares) {
-        // Where they are few, components with about the same scatter have one noise. One that repeats exactly has that of the others.
-        let is_pooled = |other: &&f64| {
-            let ratio = (*other / own).max(own / *other);
-            let alike = dof < FEWEST[1] && 2.0 * f_tail(ratio, dof as f64, dof as f64) > UNLIKE;
-            copied(*own) || alike || ratio <= 1.0
+        let fields = measured.len();
+        let orders = ORDERS[0].min(free / ORDERS[1]);
+        let function = |row: usize, column: usize| match measured.get(column) {
+            Some(axis) => readings_um[row][*axis],
+            None => legendre(column + 1 - fields, 2.0 * time[row] - 1.0),
         };
-        let pooled: Vec<f64> = squares.iter().copied().filter(|other| is_pooled(&other)).collect();
-        std_um[*axis] = (pooled.iter().sum::<f64>() / (pooled.len() * dof) as f64).sqrt();
+        let mut all = DMatrix::<f64>::zeros(rows.len(), fields + orders);
+        let mut at = 0;
+        for group in &members {
+            for column in 0..fields + orders {
+                let mean = group.iter().map(|row| function(*row, column)).sum::<f64>() / group.len() as f64;
+                for (index, row) in group.iter().enumerate() {
+                    all[(at + index, column)] = function(*row, column) - mean;
+                }
+            }
+            at += group.len();
+        }
+        let mut basis: Vec<DVector<f64>> = Vec::new();
+        for column in fields..fields + orders {
+            basis.extend(outside(all.column(column).into_owned(), &basis));
+        }
+        let left_of = |basis: &[DVector<f64>]| -> Vec<DVector<f64>> {
+            (0..fields).map(|field| without(all.column(field).into_owned(), basis)).collect()
+        };
+        let sizes: Vec<usize> = members.iter().map(Vec::len).collect();
+        let times: Vec<f64> = rows.iter().map(|row| time[*row]).collect();
+        basis.extend(step(&left_of(&basis), &sizes, &times, &basis, free));
+        let dof = free.saturating_sub(basis.len());
+        let size_um2 = readings_um.iter().flatten().filter(|value| value.is_finite()).map(|value| value * value).sum();
+        (dof >= FEWEST[0]).then(|| Self { left: left_of(&basis), members, basis, dof, size_um2 })
     }
-    Noise::Repeats { std_um, dof }
+
+    /// Noise of a reading of the measured components.
+    #[must_use]
+    pub(crate) fn noise(&self, measured: &[usize]) -> Noise {
+        let squares: Vec<f64> = self.left.iter().map(DVector::norm_squared).collect();
+        let copied = |squares: f64| squares <= COPIED * COPIED * self.size_um2;
+        if copied(squares.iter().sum()) {
+            return Noise::Unknown;
+        }
+        let dof = self.dof;
+        let mut std_um = [f64::NAN; 3];
+        for (axis, own) in measured.iter().zip(&squares) {
+            // Where they are few, components with about the same scatter have one noise. One that repeats exactly has that of the others.
+            let is_pooled = |other: &&f64| {
+                let ratio = (*other / own).max(own / *other);
+                let alike = dof < FEWEST[1] && 2.0 * f_tail(ratio, dof as f64, dof as f64) > UNLIKE;
+                copied(*own) || alike || ratio <= 1.0
+            };
+            let pooled: Vec<f64> = squares.iter().copied().filter(|other| is_pooled(&other)).collect();
+            std_um[*axis] = (pooled.iter().sum::<f64>() / (pooled.len() * dof) as f64).sqrt();
+        }
+        Noise::Repeats { std_um, dof }
+    }
+
+    /// Errors of a component, by its place among the measured ones, that depend on each other in time, where they do so beyond chance: of
+    /// up to [`FOLLOWED`] readings.
+    #[must_use]
+    pub(crate) fn correlated(&self, field: usize, time: &[f64]) -> Option<Correlated> {
+        let readings: usize = self.members.iter().map(Vec::len).sum();
+        let every = readings.div_ceil(FOLLOWED).max(1);
+        let starts = self.members.iter().scan(0, |first, rows| {
+            *first += rows.len();
+            Some(*first - rows.len())
+        });
+        let chosen: Vec<(usize, &Vec<usize>)> = starts.zip(&self.members).step_by(every).collect();
+        let at: Vec<usize> = chosen.iter().flat_map(|(first, rows)| *first..first + rows.len()).collect();
+        let pick = |column: &DVector<f64>| at.iter().map(|at| column[*at]).collect::<Vec<f64>>();
+        let mut columns: Vec<Vec<f64>> = self.basis.iter().map(pick).collect();
+        let mut first = 0;
+        for (_, rows) in &chosen {
+            let mut column = vec![0.0; at.len()];
+            column[first..first + rows.len()].fill(1.0);
+            columns.push(column);
+            first += rows.len();
+        }
+        let times: Vec<f64> = chosen.iter().flat_map(|(_, rows)| rows.iter().map(|row| time[*row])).collect();
+        Correlated::of(&times, &pick(&self.left[field]), columns)
+    }
 }
 
 fn without(mut column: DVector<f64>, basis: &[DVector<f64>]) -> DVector<f64> {

@@ -2,6 +2,7 @@
 
 use rand::{SeedableRng, seq::SliceRandom};
 use rand_chacha::ChaCha8Rng;
+use runout_core::numerics::number::significant;
 
 use crate::{
     campaign::{COMPONENTS, Campaign},
@@ -197,9 +198,11 @@ fn against_full(campaign: &Campaign, solution: &Solution) -> Option<String> {
     }
     let rms = (squares / (solution.measured.len() * queries.len()) as f64).sqrt();
     Some(format!(
-        "beside the full solution of {} of these places, predictions from neighbours differ by {rms:.2e} µm rms and {worst:.2e} µm at \
+        "beside the full solution of {} of these places, predictions from neighbours differ by {} µm rms and {} µm at \
          most, and their standard uncertainty is up to {:.2} % larger",
         some.len(),
+        significant(rms, 2),
+        significant(worst, 2),
         100.0 * (ratio - 1.0)
     ))
 }

@@ -260,7 +260,7 @@ impl Solution {
     pub(crate) fn noise_um2(&self, campaign: &Campaign, place: usize, field: usize) -> f64 {
         let observed = &self.data.observed[field];
         if Self::nugget_counts(campaign) {
-            observed.noise_um2[place]
+            observed.variance_um2(place)
         } else {
             self.covariances[field].nugget_um.powi(2) * observed.share[place]
         }

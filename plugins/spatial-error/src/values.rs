@@ -1,5 +1,6 @@
 //! Values of a result: the trend, each component's covariance, and the error before and after compensation.
 
+use nalgebra::DVector;
 use runout_core::{
     consistency::{Check, Test, refuted_by},
     summary::Value,
@@ -7,6 +8,7 @@ use runout_core::{
 
 use crate::{
     campaign::COMPONENTS,
+    checks::factors,
     conclusion::{At, Conclusion},
     curves::ComponentFit,
     joint::LeftOut,
@@ -14,6 +16,7 @@ use crate::{
     noise::Noise,
     solve::Solution,
     terms::Term,
+    whole::{Whole, root_mean_square},
 };
 
 impl Conclusion<'_> {
@@ -28,7 +31,7 @@ impl Conclusion<'_> {
             values.extend(self.of_covariance(axis).into_iter().map(|value| value.refuted_by(refuted.clone())));
             values.extend(of_left_out(axis, left_out));
         }
-        values.extend(of_compensation(queries));
+        values.extend(self.of_compensation(queries, factors(checks)));
         values
     }
 
@@ -114,29 +117,51 @@ fn of_left_out(axis: usize, left_out: &[[LeftOut; 3]]) -> [Value; 2] {
     ]
 }
 
-/// Error without the placement before and after compensation: expected squares, with the variance of the predictions.
-fn of_compensation(queries: &[At]) -> [Value; 2] {
-    let known = || queries.iter().filter_map(|query| Some((query, query.correction.as_ref()?)));
-    let rms = |squares: f64| (squares / known().count() as f64).sqrt();
-    let expected = |mean_um: [f64; 3], at: &At| -> f64 {
-        let each = mean_um.iter().zip(&at.predicted).map(|(mean, predicted)| mean * mean + predicted.variance_um2);
-        each.filter(|square| square.is_finite()).sum()
-    };
-    let before = rms(known().map(|(query, _)| expected(query.error_um, query)).sum());
-    let after = rms(known().map(|(query, correction)| expected(correction.remains_um, query)).sum());
-    let value = |symbol: &str, number: f64, about: &str| Value::new(symbol, number, f64::NAN, "um", about).key();
-    [
-        value(
-            "error_rms",
-            before,
-            "expected root mean square length of the error without the placement, at the places of the query",
-        ),
-        value(
-            "remains_rms",
-            after,
-            "the same after the corrections: what axes cannot take away, what is not smooth, and what is not known of the prediction",
-        ),
-    ]
+/// Places of the query at most that the uncertainty of an error's root mean square comes from.
+const TOGETHER: usize = 100;
+
+impl Conclusion<'_> {
+    /// Error without the placement before and after compensation: expected squares, with the variance of the predictions.
+    fn of_compensation(&self, queries: &[At], factors: [f64; 3]) -> [Value; 2] {
+        let known: Vec<(&At, [f64; 3])> =
+            queries.iter().filter_map(|at| Some((at, at.correction.as_ref()?.remains_um))).collect();
+        let some: Vec<&(&At, [f64; 3])> = known.iter().step_by(known.len().div_ceil(TOGETHER).max(1)).collect();
+        let places: Vec<[f64; 3]> = some.iter().map(|(at, _)| at.place_mm).collect();
+        // Predictions from nearest places have no covariance with each other.
+        let together = (self.solution.neighbours.is_none() && !places.is_empty())
+            .then(|| Whole::new(self.campaign, self.solution, &places, factors));
+        let rms_of = |mean_um: &dyn Fn(&(&At, [f64; 3])) -> [f64; 3]| {
+            let expected = |one: &(&At, [f64; 3])| -> f64 {
+                let each = mean_um(one).into_iter().zip(one.0.predicted);
+                let squares = each.map(|(mean, predicted)| mean * mean + predicted.variance_um2);
+                squares.filter(|square| square.is_finite()).sum()
+            };
+            let rms = (known.iter().map(expected).sum::<f64>() / known.len() as f64).sqrt();
+            let std = together.as_ref().map_or(f64::NAN, |together| {
+                let axes = self.solution.measured.iter();
+                let means = axes.flat_map(|axis| some.iter().map(|one| mean_um(one)[*axis]));
+                let mean = DVector::from_iterator(together.mean_um.len(), means);
+                let [of_some, std] = root_mean_square(&mean, &together.covariance, places.len());
+                if of_some > 0.0 { std * rms / of_some } else { 0.0 }
+            });
+            [rms, std]
+        };
+        let value = |symbol: &str, [number, std]: [f64; 2], about: &str| {
+            Value::new(symbol, number, std, "um", about).not_negative().key()
+        };
+        [
+            value(
+                "error_rms",
+                rms_of(&|(at, _)| at.error_um),
+                "expected root mean square length of the error without the placement, at the places of the query",
+            ),
+            value(
+                "remains_rms",
+                rms_of(&|(_, remains_um)| *remains_um),
+                "the same after the corrections: what axes cannot take away, what is not smooth, and what is not known of the prediction",
+            ),
+        ]
+    }
 }
 
 /// Squareness errors, and the error over the measured volume before and after compensation by the curves.

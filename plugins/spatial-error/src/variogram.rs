@@ -80,7 +80,7 @@ pub(crate) fn columns(campaign: &Campaign, solution: &Solution) -> Vec<ArrayRef>
         for (field, of) in solution.measured.iter().enumerate() {
             let covariance = &solution.covariances[field];
             let observed = &data.observed[field];
-            let noise = observed.noise_um2.iter().sum::<f64>() / count as f64;
+            let noise = (0..count).map(|place| observed.variance_um2(place)).sum::<f64>() / count as f64;
             let share = observed.share.iter().sum::<f64>() / count as f64;
             let nugget = covariance.nugget_um.powi(2) * share + noise;
             for sums in sums.iter().filter(|sums| sums[0] > 0.0) {

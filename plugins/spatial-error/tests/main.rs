@@ -9,3 +9,4 @@ mod peers;
 mod searched;
 mod separate;
 mod support;
+mod wandering;

@@ -1,7 +1,7 @@
 //! Readings of a size that shows numbers in another unit: a thousand times larger or smaller than those of other channels, beyond
 //! the range of displacement sensors, or below their noise.
 
-use runout_core::{Complex64, rig::Rig};
+use runout_core::{Complex64, numerics::number::significant, rig::Rig};
 
 use crate::solve::Readings;
 
@@ -64,9 +64,9 @@ pub(crate) fn mistaken_units(rig: &Rig, readings: &Readings) -> Vec<String> {
     let most_um = sizes.iter().copied().fold(0.0, f64::max) / setups.sqrt();
     let below = (most_um > 0.0 && most_um < SMALLEST_UM).then(|| {
         format!(
-            "the readings of all sensors vary by no more than about {:.1e} µm over a turn: they may be in a larger unit than declared \
+            "the readings of all sensors vary by no more than about {} µm over a turn: they may be in a larger unit than declared \
              (millimetres or metres where µm is declared): write `unit = \"mm\"` at the sensors, or convert them to µm",
-            2.0 * most_um
+            significant(2.0 * most_um, 2)
         )
     });
     (0..sensors).filter_map(said).chain(beyond).chain(below).collect()

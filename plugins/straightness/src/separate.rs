@@ -4,6 +4,7 @@ use runout_core::{
     Error, ErrorKind, Result,
     fault::{Fault, known_names},
     model::Fit as _,
+    numerics::number::significant,
     pipeline::{Context, StageConfig},
     points::{
         PointColumn,
@@ -269,9 +270,9 @@ impl AxialReversal {
         let repeatability_um = repeated.sqrt();
         if counts != [1, 1] && repeatability_um > ROUNDING_UM && repeatability_um < FINEST_UM {
             warnings.push(format!(
-                "repeated traces differ by {:.1e} nm: no displacement sensor repeats so well; `reading_um` may be in mm, or traces are copies \
+                "repeated traces differ by {} nm: no displacement sensor repeats so well; `reading_um` may be in mm, or traces are copies \
                  of one",
-                1e3 * repeatability_um
+                significant(1e3 * repeatability_um, 2)
             ));
         }
         let errors = match correlated {

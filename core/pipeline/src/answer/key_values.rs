@@ -6,7 +6,7 @@ use super::MOST_KEY_VALUES;
 use crate::summary::{PlacedValue, Summary, Value};
 use runout_closed_loop::diagnosis::Diagnosis;
 use runout_evaluate::{ValueId, key_symbols};
-use runout_table::number::in_small_unit;
+use runout_numerics::number::in_small_unit;
 
 /// Up to so many sections or parts have a row of their own; more are gathered into lowest, median and highest.
 const MOST_PARTS: usize = 4;

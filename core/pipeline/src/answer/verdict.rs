@@ -2,7 +2,7 @@
 
 use crate::summary::{Decision, Limit, LimitSummary, LimitValue, Summary};
 use runout_closed_loop::diagnosis::{self, Diagnosis};
-use runout_table::number::{significant, spread, unit_text};
+use runout_numerics::number::{significant, spread, unit_text};
 
 /// A sentence, and how good what it says is.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -19,7 +19,7 @@ use crate::stage::{AverageRequest, Averager, Conditioner, Station, StationSepara
 use runout_closed_loop::closed_loop::Settings;
 use runout_consistency::turns::PhaseCourse;
 use runout_error::{Error, ErrorKind, Result};
-use runout_numerics::threads;
+use runout_numerics::{number::significant, threads};
 use runout_turning::{
     calibrated::calibrated,
     counted_turns,
@@ -240,8 +240,11 @@ pub(crate) fn separate(separator: &dyn StationSeparator, station: &Station, rig:
             let unknown = separation.position(Quantity::Form(section))?;
             let squares: f64 = separation.coefficients(unknown).skip(1).map(|value| value.norm_sqr()).sum();
             let (rms_mm, radius_mm) = (1e-3 * (0.5 * squares).sqrt(), rig.part_radius_mm);
-            let problem =
-                format!("the form of section {} comes out as {rms_mm:.3e} mm rms on {radius_mm} mm radius", at.id);
+            let problem = format!(
+                "the form of section {} comes out as {} mm rms on {radius_mm} mm radius",
+                at.id,
+                significant(rms_mm, 3)
+            );
             (rms_mm > radius_mm).then_some(problem)
         }),
     };

@@ -13,6 +13,7 @@ use runout_closed_loop::{
 };
 use runout_consistency::Check;
 use runout_error::Result;
+use runout_numerics::number::significant;
 use runout_table::{ColumnSpec, Figure, Measure, TableRows, TableSpec, counts, numbers, texts};
 use runout_turning::surface::Surface;
 
@@ -26,9 +27,10 @@ pub fn far_below_noise(chi2_per_dof: f64, dof: usize) -> Option<String> {
     let chance = 1.0 - deviations * (2.0 / dof.max(1) as f64).sqrt();
     (dof > 0 && chi2_per_dof < share.min(chance)).then(|| {
         format!(
-            "χ² per degree of freedom is {chi2_per_dof:.2e}, far below 1: the residual is {:.2e} times the noise. The noise is stated too \
+            "χ² per degree of freedom is {}, far below 1: the residual is {} times the noise. The noise is stated too \
              large, or noise or readings have another unit, or readings were smoothed or copied; standard uncertainties are not valid",
-            chi2_per_dof.max(0.0).sqrt()
+            significant(chi2_per_dof, 2),
+            significant(chi2_per_dof.max(0.0).sqrt(), 2)
         )
     })
 }

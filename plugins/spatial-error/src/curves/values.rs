@@ -7,11 +7,12 @@
 use faer::Mat;
 use nalgebra::DVector;
 
-use super::{
-    Basis, ComponentFit, Unseen, Whole, lost, named,
-    volumetric::{Projection, root_mean_square},
+use super::{Basis, ComponentFit, Unseen, lost, named, volumetric::Projection};
+use crate::{
+    campaign::Campaign,
+    solve::Solution,
+    whole::{Whole, root_mean_square},
 };
-use crate::{campaign::Campaign, solve::Solution};
 
 /// Names of the squareness errors.
 pub(super) const ANGLES: [&str; 3] = ["EC0Y", "EB0Z", "EA0Z"];
@@ -55,13 +56,12 @@ pub(super) fn evaluate(
     };
     let values: Vec<[f64; 2]> = (0..combinations.len()).map(value).collect();
     let (left, before) = (projection.left(), projection.rigid()?.left());
-    let total = whole.mean_um.len();
-    let own = Mat::<f64>::identity(total, total);
     let after_mean = apply(&left, &whole.mean_um);
+    let spread_by = |matrix: &Mat<f64>| matrix * &whole.covariance * matrix.transpose();
     let volumetric = Volumetric {
-        before: root_mean_square(&apply(&before, &whole.mean_um), &before, &whole.covariance, places.len()),
-        after: root_mean_square(&after_mean, &own, &whole.covariance, places.len()),
-        beyond: root_mean_square(&after_mean, &left, &whole.covariance, places.len()),
+        before: root_mean_square(&apply(&before, &whole.mean_um), &spread_by(&before), places.len()),
+        after: root_mean_square(&after_mean, &whole.covariance, places.len()),
+        beyond: root_mean_square(&after_mean, &spread_by(&left), places.len()),
     };
     let (nodes, location) = named(basis, campaign.volume.chain, &values);
     let missing = lost(&nodes);

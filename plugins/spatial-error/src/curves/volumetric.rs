@@ -83,22 +83,3 @@ impl Projection {
         })
     }
 }
-
-/// Root mean square length of errors B·e at places, e with a covariance, and its standard uncertainty: mean and variance of a quadratic
-/// form of normal errors (Searle, *Linear Models* (1971), section 2.5).
-pub(super) fn root_mean_square(mean: &DVector<f64>, by: &Mat<f64>, covariance: &Mat<f64>, places: usize) -> [f64; 2] {
-    let spread = by * covariance * by.transpose();
-    let total = mean.len();
-    let trace: f64 = (0..total).map(|at| spread[(at, at)]).sum();
-    let (mut squares, mut shifted) = (0.0, 0.0);
-    for column in 0..total {
-        for row in 0..total {
-            squares += spread[(row, column)].powi(2);
-            shifted += mean[row] * spread[(row, column)] * mean[column];
-        }
-    }
-    let sum = mean.norm_squared() + trace;
-    let rms = (sum / places as f64).sqrt();
-    let std = (2.0 * squares + 4.0 * shifted).max(0.0).sqrt() / (2.0 * places as f64 * rms);
-    [rms, if rms > 0.0 { std } else { 0.0 }]
-}

@@ -2,7 +2,7 @@
 
 use super::{BatchReport, Series, SpeedSeries};
 use crate::stage::{Overview, Part, Section};
-use runout_table::number::significant;
+use runout_numerics::number::significant;
 
 /// Signals that are listed; all are in the table of the trend.
 const LISTED: usize = 200;

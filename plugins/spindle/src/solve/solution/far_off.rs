@@ -1,6 +1,6 @@
 //! What is said of a part that turns far off the axis.
 
-use runout_core::{Error, ErrorKind, stage::Station};
+use runout_core::{Error, ErrorKind, numerics::number::significant, stage::Station};
 
 use super::{Estimate, Readings, Solver};
 
@@ -21,7 +21,8 @@ impl Solver<'_> {
             let moved_um = estimate.moved_um;
             let problem = format!(
                 "{ratio} couples the orders so strongly that no solution settles: the last pass still moves the readings \
-                 by {moved_um:.2e} µm rms"
+                 by {} µm rms",
+                significant(moved_um, 2)
             );
             let help = "centre the part better, or average on fewer angles (samples_per_rev): the coupling grows with the order";
             (problem, help)
