@@ -31,6 +31,7 @@
 pub mod blocks;
 pub mod check;
 pub mod groups;
+pub mod in_time;
 pub mod keys;
 pub mod left_out;
 pub mod linear;

@@ -5,6 +5,7 @@ use serde::Deserialize;
 
 use crate::rig::Rig;
 use runout_error::fault::Fault;
+use runout_numerics::statistics::median;
 
 /// `marker = { channel = "MARK", threshold = 2.5, hysteresis = 0.5, edge = "rising" }` of a loader.
 #[derive(Debug, Clone, PartialEq, Deserialize, JsonSchema)]
@@ -57,6 +58,20 @@ impl Marker {
     }
 }
 
+/// Where turns begin.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Marks {
+    /// Sample positions, ascending.
+    pub at: Vec<f64>,
+    /// To how many samples each is known; 0 where it is timed between two samples.
+    pub within_samples: f64,
+}
+
+/// Share of a pulse's height from which the step between two samples is a flank without a sample on it.
+const WHOLE_FLANK: f64 = 0.9;
+/// Such a flank is somewhere between a sample and the next.
+const HALF_A_SAMPLE: f64 = 0.5;
+
 /// Finds the marks of a trace, sample by sample.
 #[derive(Debug, Clone)]
 pub struct MarkerScan {
@@ -68,6 +83,8 @@ pub struct MarkerScan {
     lowest: f64,
     highest: f64,
     marks: Vec<f64>,
+    /// What the trace gains from the sample before each mark to the one behind it.
+    steps: Vec<f64>,
 }
 
 impl MarkerScan {
@@ -82,6 +99,7 @@ impl MarkerScan {
             lowest: f64::INFINITY,
             highest: f64::NEG_INFINITY,
             marks: Vec::new(),
+            steps: Vec::new(),
         }
     }
 
@@ -103,6 +121,7 @@ impl MarkerScan {
         if self.armed && now >= 0.0 {
             // Armed is only a trace that was below; NaN and a step of 0 cannot be here.
             self.marks.push((self.samples - 1) as f64 + before / (before - now));
+            self.steps.push(now - before);
             self.armed = false;
         }
         self.armed |= now < 0.0 && now <= -hysteresis;
@@ -112,11 +131,11 @@ impl MarkerScan {
         Ok(())
     }
 
-    /// Sample positions at which turns begin.
+    /// Where turns begin. A rectangular pulse has no sample on its flank: it crosses anywhere between two samples, whatever the threshold.
     ///
     /// # Errors
     /// Where no two crossings were found; the message says what the trace holds.
-    pub fn marks(self) -> Result<Vec<f64>, String> {
+    pub fn marks(self) -> Result<Marks, String> {
         let Marker { threshold, hysteresis, .. } = self.marker;
         if self.marks.len() < 2 {
             return Err(format!(
@@ -128,7 +147,12 @@ impl MarkerScan {
                 self.highest,
             ));
         }
-        Ok(self.marks)
+        if median(self.steps) < WHOLE_FLANK * (self.highest - self.lowest) {
+            return Ok(Marks { at: self.marks, within_samples: 0.0 });
+        }
+        // On the threshold itself the crossing is the later sample.
+        let halfway = |mark: f64| (mark.ceil() - HALF_A_SAMPLE).max(0.0);
+        Ok(Marks { at: self.marks.into_iter().map(halfway).collect(), within_samples: HALF_A_SAMPLE })
     }
 }
 
@@ -143,7 +167,7 @@ mod tests {
         marker.check_with(None).unwrap();
         let mut scan = MarkerScan::new(&marker);
         trace.iter().try_for_each(|value| scan.push(*value))?;
-        scan.marks()
+        scan.marks().map(|marks| marks.at)
     }
 
     #[test]
@@ -154,6 +178,23 @@ mod tests {
         assert_eq!(marks(Edge::Falling, 0.5, &pulses).unwrap(), [2.0 + 2.0 / 3.0, 6.6]);
         // On the threshold itself.
         assert_eq!(marks(Edge::Rising, 0.0, &[0.0, 2.0, 2.0, 0.0, 3.0]).unwrap(), [1.0, 3.0 + 2.0 / 3.0]);
+    }
+
+    /// Rectangular pulses, also with noise on them, are known to half a sample; pulses with samples on their flanks are timed.
+    #[test]
+    fn a_flank_without_a_sample_is_known_to_half_a_sample() {
+        let within = |trace: &dyn Fn(usize) -> f64| {
+            let marker = Marker { channel: "MARK".into(), threshold: 2.5, hysteresis: 0.5, edge: Edge::Rising };
+            let mut scan = MarkerScan::new(&marker);
+            (0..2000).try_for_each(|sample| scan.push(trace(sample))).unwrap();
+            scan.marks().unwrap()
+        };
+        let noise = |sample: usize| 0.02 * ((sample * 7919 % 101) as f64 / 50.0 - 1.0);
+        let rectangular = within(&|sample| if sample % 500 > 480 { 5.0 } else { 0.0 } + noise(sample));
+        assert_eq!((rectangular.within_samples, rectangular.at[..2].to_vec()), (0.5, vec![480.5, 980.5]));
+        let rounded =
+            within(&|sample| (2.5 + 0.9 * ((sample as f64 * 1.002) % 500.0 - 480.0)).clamp(0.0, 5.0) + noise(sample));
+        assert_eq!((rounded.within_samples, rounded.at.len()), (0.0, 4));
     }
 
     #[test]

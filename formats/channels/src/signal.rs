@@ -37,19 +37,14 @@ impl Signal {
         Ok(())
     }
 
-    /// Lowest and highest of all samples, and whether there are no others.
-    pub(crate) fn range(&self) -> Result<(f64, f64, bool)> {
+    /// Lowest and highest of all samples.
+    pub(crate) fn range(&self) -> Result<(f64, f64)> {
         let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
         self.each(|value| {
             (low, high) = (low.min(value), high.max(value));
             Ok(())
         })?;
-        let mut has_others = false;
-        self.each(|value| {
-            has_others |= value > low && value < high;
-            Ok(())
-        })?;
-        Ok((low, high, !has_others))
+        Ok((low, high))
     }
 }
 

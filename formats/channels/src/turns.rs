@@ -6,6 +6,7 @@ use runout_core::{
     Error, Result,
     encoder::EncoderScan,
     marker::{Marker, MarkerScan},
+    numerics::statistics::median,
 };
 
 use crate::{
@@ -17,8 +18,6 @@ use crate::{
     unit::{self, Known},
 };
 
-/// A mark of a channel of two values is somewhere between a sample and the next.
-const HALF_A_SAMPLE: f64 = 0.5;
 /// Pulses whose distance differs by this factor from the one before are not next to each other.
 const LOST_PULSE: f64 = 1.7;
 /// What to do where a trace has no marks.
@@ -117,6 +116,15 @@ impl Turns {
         let mut first_rev = 0.0;
         if let Some(zero) = &place.config.zero {
             let (zeros, _) = crossings(place, signals, zero)?;
+            let pulses = zeros
+                .windows(2)
+                .map(|pair| marks.partition_point(|at| *at < pair[1]) - marks.partition_point(|at| *at < pair[0]));
+            let found = median(pulses.map(|count| count as f64));
+            if (found - per_turn).abs() > 1.0 {
+                let problem = format!("expected {per_turn} pulses from a zero to the next, found {found}");
+                let help = "set `pulses_per_turn` to the pulses of a turn of the part; a zero that comes once a turn of another shaft is none";
+                return Err(Error::new("read", shown(), problem).help(help));
+            }
             let inside = zeros.iter().find(|zero| marks.first() <= Some(*zero) && Some(*zero) < marks.last());
             let Some(at) = inside else {
                 return Err(Error::new("read", shown(), "expected a mark of the zero between the pulses, found none"));
@@ -180,7 +188,7 @@ impl Turns {
         let to = place.clock_beside(&signal, &signals.common)?;
         let instants = Instants::between(signals.common.clock, to);
         let instants = instants.map_err(|problem| signal.error(problem))?;
-        let (low, high, _) = signal.range()?;
+        let (low, high) = signal.range()?;
         // What stays within one turn begins anew with each.
         let is_wrapped = (high - low) * degrees <= 360.0;
         let period_deg = is_wrapped.then_some(360.0);
@@ -302,7 +310,7 @@ fn crossings(place: &Place, signals: &Signals, mark: &MarkConfig) -> Result<(Vec
     let signal = place.signal(&mark.channel)?;
     let instants = Instants::between(place.clock_beside(&signal, &signals.common)?, signals.common.clock);
     let instants = instants.map_err(|problem| signal.error(problem))?;
-    let (low, high, is_digital) = signal.range()?;
+    let (low, high) = signal.range()?;
     let marker = Marker {
         channel: mark.channel.clone(),
         threshold: mark.threshold.unwrap_or(low + 0.5 * (high - low)),
@@ -317,10 +325,7 @@ fn crossings(place: &Place, signals: &Signals, mark: &MarkConfig) -> Result<(Vec
         Ok(())
     })?;
     let found = scan.marks().map_err(|problem| signal.error(problem).help(LEVELS))?;
-    // Of two values, the crossing is half-way, whatever the threshold.
-    let halfway = |mark: f64| if is_digital { mark.floor() + HALF_A_SAMPLE } else { mark };
-    let within_samples = if is_digital { HALF_A_SAMPLE * instants.ratio } else { 0.0 };
-    Ok((found.into_iter().map(|mark| instants.of(halfway(mark))).collect(), within_samples))
+    Ok((found.at.into_iter().map(|mark| instants.of(mark)).collect(), found.within_samples * instants.ratio))
 }
 
 /// Marks among the samples.

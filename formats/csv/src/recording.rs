@@ -34,9 +34,6 @@ pub(crate) struct CsvRecording {
     most_kept: usize,
 }
 
-/// A mark of a column `index` is somewhere between a sample and the next.
-const HALF_A_SAMPLE: f64 = 0.5;
-
 /// What a column of marks leaves open between setups.
 const MARKS_AT_WHOLE_SAMPLES: &str = "marks of a column `index` are at whole samples: half a sample is not known of the angle between two \
     setups. The stated uncertainties include it; an encoder's angle, a trace of the mark, or fractional marks (HDF5) make them smaller";
@@ -87,7 +84,6 @@ impl Recording for CsvRecording {
         let marker = self.stated.marker.as_ref();
         let rows = Rows::open(file, &self.rig, marker)?;
         let shown = rows.format.header.shown.clone();
-        let at_whole_samples = matches!(rows.format.header.phase, Phase::Index(_));
         let mut scan = Scan::of(rows, marker, threads, self.most_kept)?;
         let sample_rate_hz = match (self.stated.sample_rate_hz, scan.sample_rate_hz) {
             (Some(stated), Some(found)) if (found / stated - 1.0).abs() > SAME_RATE => {
@@ -112,7 +108,7 @@ impl Recording for CsvRecording {
             sensor_ids: self.rig.sensors.iter().map(|sensor| sensor.id.clone()).collect(),
             converter_limits_um: None,
             marks: scan.marks.clone(),
-            marks_within_samples: if at_whole_samples { HALF_A_SAMPLE } else { 0.0 },
+            marks_within_samples: scan.within_samples,
             encoder: scan.encoder.is_some(),
             trimmed: Vec::new(),
             responses: Vec::new(),

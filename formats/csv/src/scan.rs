@@ -7,7 +7,7 @@ use runout_core::{
     Error, ErrorKind, Result,
     clock::ClockScan,
     encoder::EncoderScan,
-    marker::{Marker, MarkerScan},
+    marker::{Marker, MarkerScan, Marks},
     measurement::Block,
 };
 
@@ -23,6 +23,8 @@ const TIME_HELP: &str = "samples have to be taken at equal times: where some are
 pub(crate) struct Scan {
     pub(crate) samples: u64,
     pub(crate) marks: Vec<f64>,
+    /// To how many samples each mark is known.
+    pub(crate) within_samples: f64,
     pub(crate) encoder: Option<EncoderScan>,
     /// From the column `time_s`.
     pub(crate) sample_rate_hz: Option<f64>,
@@ -65,13 +67,13 @@ impl Scan {
             return Err(Error::new("read", shown, "expected samples below the header, found none")
                 .of(ErrorKind::InsufficientData));
         }
-        let (marks, encoder) = turns.marks().map_err(|problem| {
+        let (Marks { at: marks, within_samples }, encoder) = turns.marks().map_err(|problem| {
             Error::new("read", &shown, problem)
                 .help("set `threshold` and `hysteresis` of `marker` in [load] between its levels")
         })?;
         let kept = kept.map(|blocks| blocks.into_iter().filter(|block| !block.samples.is_empty()).collect());
         let sample_rate_hz = time.rate_hz().map_err(|problem| Error::new("read", &shown, problem).help(TIME_HELP))?;
-        Ok(Self { samples, marks, encoder, sample_rate_hz, kept })
+        Ok(Self { samples, marks, within_samples, encoder, sample_rate_hz, kept })
     }
 }
 
@@ -104,10 +106,11 @@ impl Turns {
         }
     }
 
-    fn marks(self) -> std::result::Result<(Vec<f64>, Option<EncoderScan>), String> {
+    fn marks(self) -> std::result::Result<(Marks, Option<EncoderScan>), String> {
         Ok(match self {
-            Self::Index(index) => (index.marks, None),
-            Self::Encoder(encoder) => (encoder.marks().to_vec(), Some(encoder)),
+            // A mark of 0 and 1 is somewhere between a sample and the next.
+            Self::Index(index) => (Marks { at: index.marks, within_samples: 0.5 }, None),
+            Self::Encoder(encoder) => (Marks { at: encoder.marks().to_vec(), within_samples: 0.0 }, Some(encoder)),
             Self::Trace(trace) => (trace.marks()?, None),
         })
     }

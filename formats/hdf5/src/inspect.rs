@@ -121,7 +121,7 @@ fn measurement(file: &File, place: &Place, report: &mut FileReport) -> Result<()
             let source = CaptureSource::open(&group, &place, &station, None)?;
             // A trace of the mark is only known by the configuration.
             let is_known = source.phase.check().is_ok();
-            let marks = if is_known { source.marks()?.0 } else { Vec::new() };
+            let marks = if is_known { source.marks()?.0.at } else { Vec::new() };
             let capture = CaptureReport {
                 setup: setup.clone(),
                 samples: source.stored.samples,

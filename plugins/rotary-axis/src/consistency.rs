@@ -6,7 +6,7 @@
 
 use nalgebra::Vector3;
 use runout_core::{
-    consistency::{Check, Kind, LinearFit, Shift, Structure, Test, judge, linear, repeats::repeats},
+    consistency::{Check, Kind, LinearFit, Shift, Structure, Test, in_time::InTime, judge, linear, repeats::repeats},
     numerics::{least_squares::Basis, statistics::f_tail},
     points::mistakes,
     summary::Value,
@@ -116,7 +116,22 @@ pub(crate) fn checks(axis: Axis, campaign: &Campaign, effects: &[Column], found:
     let mut all: Vec<Check> = of_noise.into_iter().chain(of_passes(campaign)).collect();
     all.extend(closing_check(campaign, effects));
     all.extend(of_rows(axis, campaign, effects));
+    all.extend(of_time(campaign, found));
     all
+}
+
+/// Readings of a ball at a command in several passes, as errors along time.
+fn of_time(campaign: &Campaign, found: &Fit) -> Vec<Check> {
+    let mut places = vec![Vec::new(); campaign.balls.len() * campaign.commands_deg.len()];
+    for (row, reading) in campaign.readings.iter().enumerate() {
+        places[reading.ball * campaign.commands_deg.len() + reading.command].push(row);
+    }
+    let of_coordinate = |(coordinate, name): (usize, &&str)| {
+        let left: Vec<f64> = found.residual.iter().map(|left| 1e3 * left[coordinate]).collect();
+        let in_time = InTime::of(&places, &campaign.time, &left, &[])?;
+        Some(in_time.check(name, COORDINATES.len(), "µm", 1.0))
+    };
+    COORDINATES.iter().enumerate().filter_map(of_coordinate).collect()
 }
 
 /// Passes of a ball with readings of another place.

@@ -6,16 +6,16 @@ use faer::Mat;
 use nalgebra::{DMatrix, DVector};
 use runout_core::{
     Error, Result,
-    consistency::Check,
+    consistency::{Check, in_time::InTime},
     points::{PointColumn, PointKind::Number, Points, mistakes},
 };
 
 pub(crate) use crate::measured::COMPONENTS;
 use crate::{
-    correlated::{Correlated, SharedErrors},
     joint::{Data, Observed, Within},
     measured::{Measured, looks_wrong},
     noise::{Noise, Repeats},
+    shared_errors::SharedErrors,
     span::Span,
     terms::{Term, Volume},
 };
@@ -76,7 +76,7 @@ pub struct Campaign {
     /// What is known of the noise.
     pub noise: Noise,
     /// Errors of each component that depend on each other in time.
-    pub correlated: [Option<Correlated>; 3],
+    pub correlated: [Option<InTime>; 3],
     /// The measured volume.
     pub volume: Volume,
     /// The line, plane or space that the places span.
@@ -146,12 +146,15 @@ impl Campaign {
             (None, None) => repeats.as_ref().map_or(Noise::Unknown, |repeats| repeats.noise(&measured)),
         };
         let mut correlated = [None; 3];
-        for (field, axis) in measured.iter().enumerate().filter(|_| noise != Noise::Unknown) {
-            correlated[*axis] = repeats.as_ref().and_then(|repeats| repeats.correlated(field, &time));
+        let shown = repeats.filter(|_| noise != Noise::Unknown);
+        for (field, axis) in measured.iter().enumerate() {
+            correlated[*axis] = shown.as_ref().and_then(|repeats| repeats.correlated(field, &time));
             if let (Some(found), Noise::Repeats { std_um, .. }) = (&correlated[*axis], &mut noise) {
-                std_um[*axis] = found.independent_um2.sqrt();
+                std_um[*axis] = found.independent.sqrt();
             }
-            checks.extend(correlated[*axis].map(|found| found.check(COMPONENTS[*axis], measured.len())));
+            checks.extend(
+                correlated[*axis].map(|found| found.check(COMPONENTS[*axis], measured.len(), "µm", 1.0).named()),
+            );
         }
         if place_of.len() > places_mm.len() && noise == Noise::Unknown {
             remarks.push(format!(
@@ -266,7 +269,7 @@ impl Campaign {
             }
             // Only what changes slowly in time is fitted to the differences within places.
             let spacing = (self.place_of.len().max(2) as f64 - 1.0).recip();
-            let slowly_um2 = self.correlated[axis].map_or(0.0, |found| found.slowly_um2(spacing));
+            let slowly_um2 = self.correlated[axis].map_or(0.0, |found| found.slowly(spacing));
             for (row, place) in self.place_of.iter().enumerate().filter(|_| known) {
                 let index = position[*place];
                 if index == usize::MAX || repeats[index] < 2 {
@@ -296,7 +299,7 @@ impl Campaign {
     }
 
     /// Errors that means of places share: `position` of each place among them, and sums of the weights of their readings.
-    fn shared(&self, of: Correlated, axis: usize, position: &[usize], weights: &[f64]) -> SharedErrors {
+    fn shared(&self, of: InTime, axis: usize, position: &[usize], weights: &[f64]) -> SharedErrors {
         let mut readings = vec![Vec::new(); weights.len()];
         for (row, place) in self.place_of.iter().enumerate() {
             if let Some(own) = readings.get_mut(position[*place]) {

@@ -18,8 +18,8 @@ use faer::{
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 use crate::{
-    correlated::SharedErrors,
     correlation::{Family, Scaled},
+    shared_errors::SharedErrors,
 };
 
 /// A stationary covariance: s²R(d) + n² at one place, d scaled by the range of each axis.

@@ -1,9 +1,9 @@
 //! Noise of one reading from repeats: their scatter after a smooth drift in time, and a step if there is one, that are common to all places.
 
 use nalgebra::{DMatrix, DVector};
-use runout_core::numerics::statistics::f_tail;
+use runout_core::{consistency::in_time::InTime, numerics::statistics::f_tail};
 
-use crate::{correlated::Correlated, terms::legendre};
+use crate::terms::legendre;
 
 /// What is known of the noise.
 #[derive(Debug, Clone, PartialEq)]
@@ -34,8 +34,6 @@ const STEPS: usize = 200;
 const STEP_CHANCE: f64 = 1e-6;
 /// Scatter below this share of the deviations is that of copied rows.
 const COPIED: f64 = 1e-9;
-/// Readings at most that show how errors depend on each other in time.
-const FOLLOWED: usize = 200;
 
 /// Readings of places that were read more than once: what they differ by within a place, after a drift and a step that are common to all.
 pub(crate) struct Repeats {
@@ -124,29 +122,18 @@ impl Repeats {
         Noise::Repeats { std_um, dof }
     }
 
-    /// Errors of a component, by its place among the measured ones, that depend on each other in time, where they do so beyond chance: of
-    /// up to [`FOLLOWED`] readings.
+    /// Errors of a component, by its place among the measured ones, that depend on each other in time, where they do so beyond chance.
     #[must_use]
-    pub(crate) fn correlated(&self, field: usize, time: &[f64]) -> Option<Correlated> {
-        let readings: usize = self.members.iter().map(Vec::len).sum();
-        let every = readings.div_ceil(FOLLOWED).max(1);
-        let starts = self.members.iter().scan(0, |first, rows| {
-            *first += rows.len();
-            Some(*first - rows.len())
-        });
-        let chosen: Vec<(usize, &Vec<usize>)> = starts.zip(&self.members).step_by(every).collect();
-        let at: Vec<usize> = chosen.iter().flat_map(|(first, rows)| *first..first + rows.len()).collect();
-        let pick = |column: &DVector<f64>| at.iter().map(|at| column[*at]).collect::<Vec<f64>>();
-        let mut columns: Vec<Vec<f64>> = self.basis.iter().map(pick).collect();
-        let mut first = 0;
-        for (_, rows) in &chosen {
-            let mut column = vec![0.0; at.len()];
-            column[first..first + rows.len()].fill(1.0);
-            columns.push(column);
-            first += rows.len();
-        }
-        let times: Vec<f64> = chosen.iter().flat_map(|(_, rows)| rows.iter().map(|row| time[*row])).collect();
-        Correlated::of(&times, &pick(&self.left[field]), columns)
+    pub(crate) fn correlated(&self, field: usize, time: &[f64]) -> Option<InTime> {
+        let mut next = 0;
+        let place = |readings: &Vec<usize>| {
+            next += readings.len();
+            (next - readings.len()..next).collect::<Vec<usize>>()
+        };
+        let places: Vec<Vec<usize>> = self.members.iter().map(place).collect();
+        let times: Vec<f64> = self.members.iter().flatten().map(|row| time[*row]).collect();
+        let columns: Vec<Vec<f64>> = self.basis.iter().map(|column| column.as_slice().to_vec()).collect();
+        InTime::of(&places, &times, self.left[field].as_slice(), &columns)
     }
 }
 

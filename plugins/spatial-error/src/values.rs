@@ -120,18 +120,21 @@ fn of_left_out(axis: usize, left_out: &[[LeftOut; 3]]) -> [Value; 2] {
 /// Places of the query at most that the uncertainty of an error's root mean square comes from.
 const TOGETHER: usize = 100;
 
+/// A prediction, and what remains of it.
+type Known<'a> = (&'a At, [f64; 3]);
+
 impl Conclusion<'_> {
     /// Error without the placement before and after compensation: expected squares, with the variance of the predictions.
     fn of_compensation(&self, queries: &[At], factors: [f64; 3]) -> [Value; 2] {
-        let known: Vec<(&At, [f64; 3])> =
+        let known: Vec<Known> =
             queries.iter().filter_map(|at| Some((at, at.correction.as_ref()?.remains_um))).collect();
-        let some: Vec<&(&At, [f64; 3])> = known.iter().step_by(known.len().div_ceil(TOGETHER).max(1)).collect();
+        let some: Vec<&Known> = known.iter().step_by(known.len().div_ceil(TOGETHER).max(1)).collect();
         let places: Vec<[f64; 3]> = some.iter().map(|(at, _)| at.place_mm).collect();
         // Predictions from nearest places have no covariance with each other.
         let together = (self.solution.neighbours.is_none() && !places.is_empty())
             .then(|| Whole::new(self.campaign, self.solution, &places, factors));
-        let rms_of = |mean_um: &dyn Fn(&(&At, [f64; 3])) -> [f64; 3]| {
-            let expected = |one: &(&At, [f64; 3])| -> f64 {
+        let rms_of = |mean_um: &dyn Fn(&Known) -> [f64; 3]| {
+            let expected = |one: &Known| -> f64 {
                 let each = mean_um(one).into_iter().zip(one.0.predicted);
                 let squares = each.map(|(mean, predicted)| mean * mean + predicted.variance_um2);
                 squares.filter(|square| square.is_finite()).sum()

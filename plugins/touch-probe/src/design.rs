@@ -5,7 +5,7 @@
 use nalgebra::DMatrix;
 use runout_core::{
     consistency::rows::Rows,
-    numerics::least_squares::{LeastNorm, SINGULAR, least_norm},
+    numerics::least_squares::{LeastNorm, least_norm},
 };
 
 use crate::{
@@ -14,6 +14,10 @@ use crate::{
     touches::{Touch, Touches},
     waves::{Part, angles, wave},
 };
+
+/// Singular value, as a share of the largest, below which the touches do not show a combination of parameters: directions are evenly spaced
+/// but for what the stylus is off by, and such a combination would have a thousand times the noise.
+const UNSEEN: f64 = 1e-3;
 
 /// A parameter of the model.
 #[derive(Debug, Clone, PartialEq)]
@@ -169,7 +173,7 @@ impl Design {
     pub(crate) fn fit(&self, readings_um: &[f64], weights: &Weights, used: &[usize]) -> Fitted {
         let columns = weighted(&self.columns, weights, used);
         let values: Vec<f64> = used.iter().map(|row| readings_um[*row] / weights.std_um[*row]).collect();
-        let solved = least_norm(&columns, &values, SINGULAR);
+        let solved = least_norm(&columns, &values, UNSEEN);
         let chi2: f64 = solved.residual.iter().map(|value| value * value).sum();
         let level = if solved.dof > 0 { chi2 / solved.dof as f64 } else { f64::NAN };
         let residual_um = solved.residual.iter().zip(used).map(|(value, row)| value * weights.std_um[*row]).collect();

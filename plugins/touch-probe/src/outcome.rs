@@ -296,6 +296,14 @@ impl Found<'_> {
         if lobing[1..] != *declared_lobing || form[1..] != declared[..] {
             remarks.push(lost_orders(&listed(&lobing), &listed(&form)));
         }
+        let directions = self.touches.all.iter().map(|touch| touch.direction + 1).max().unwrap_or(0);
+        let needed = 2 * self.config.max_order + 1;
+        if directions < needed {
+            remarks.push(format!(
+                "{directions} directions determine orders up to {}: set `max_order` to that, or touch in {needed} directions and more",
+                directions.saturating_sub(1) / 2
+            ));
+        }
         let silent: Vec<&str> = (0..self.config.setups.len())
             .filter(|setup| !self.touches.setups.contains(setup))
             .map(|setup| self.config.setups[setup].id.as_str())

@@ -93,12 +93,13 @@ impl<'a> Profile<'a> {
     pub(super) fn heights(&self, settings: &Settings) -> Texture {
         let measured_mm: f64 = self.extents().map(|(_, length)| length).sum();
         let wanted = settings.section_mm.or(settings.lambda_c_mm).unwrap_or(measured_mm / 5.0);
-        // A length that is whole sections but for a little has them all.
-        let off_mm = AT_AN_END * measured_mm / self.heights_um.len().max(1) as f64;
+        let spacing_mm = measured_mm / self.heights_um.len().max(1) as f64;
+        let off_mm = AT_AN_END * spacing_mm;
         let mut extremes = Vec::new();
         let mut sections = 0;
         for (stretch, (start, length)) in self.stretches.iter().zip(self.extents()) {
-            let of_stretch = (((length + off_mm) / wanted) as usize).clamp(1, stretch.len().max(1));
+            // Each point stands for a spacing: a length that is whole sections but for one has them all.
+            let of_stretch = (((length + spacing_mm + off_mm) / wanted) as usize).clamp(1, stretch.len().max(1));
             let section_mm = length / of_stretch as f64;
             // A point at the end of a section is the next one's, also where its place is off a little.
             let start = start - off_mm;

@@ -178,6 +178,21 @@ fn places_at_the_end_of_a_section_may_be_off_a_little() {
     }
 }
 
+/// An instrument that writes 4 mm as 8000 points half a micrometre apart has as many sections as one that writes the last point too.
+#[test]
+fn a_length_without_its_last_point_has_all_sections() {
+    let settings = Settings { lambda_c_mm: Some(0.8), ..Settings::default() };
+    let of = |count: i32| {
+        let places: Vec<f64> = (0..count).map(|point| 0.0005 * f64::from(point)).collect();
+        let profile: Vec<f64> = (0..count).map(|point| f64::from(point * 7919 % 1013) / 500.0).collect();
+        along(&places, &profile, &settings)
+    };
+    let (without, with) = (of(8000), of(8001));
+    assert_eq!((without.sections, with.sections), (4, 4));
+    assert!((without.rz / with.rz - 1.0).abs() < 0.01, "{} {}", without.rz, with.rz);
+    assert_eq!(of(7900).sections, 3);
+}
+
 /// Waves of 1.6 mm with λc = 4 mm over 60 mm, of which a third was not measured: texture is that of the whole line, whether points are absent or
 /// not numbers. Stretches shorter than a section and the ends of the filter have none.
 #[test]

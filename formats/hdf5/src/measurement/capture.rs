@@ -4,7 +4,7 @@ use hdf5_metno::{Dataset, Group};
 use runout_core::{
     Result,
     encoder::EncoderScan,
-    marker::{Marker, MarkerScan},
+    marker::{Marker, MarkerScan, Marks},
 };
 
 use super::{
@@ -76,9 +76,10 @@ impl CaptureSource {
     }
 
     /// Sample positions at which turns begin, and the scan that says how to read the encoder.
-    pub(crate) fn marks(&self) -> Result<(Vec<f64>, Option<EncoderScan>)> {
+    pub(crate) fn marks(&self) -> Result<(Marks, Option<EncoderScan>)> {
+        let timed = |at: Vec<f64>| Marks { at, within_samples: 0.0 };
         match &self.phase {
-            Phase::Index(vector) => Ok((positions(vector, self.stored.samples)?, None)),
+            Phase::Index(vector) => Ok((timed(positions(vector, self.stored.samples)?), None)),
             Phase::Angle(vector) => {
                 let mut scan = EncoderScan::default();
                 vector.each(|angle_deg| {
@@ -90,14 +91,14 @@ impl CaptureSource {
                         }
                     })
                 })?;
-                Ok((scan.marks().to_vec(), Some(scan)))
+                Ok((timed(scan.marks().to_vec()), Some(scan)))
             }
             Phase::Trace(trace, marker) => Ok((self.crossings(trace, marker)?, None)),
             Phase::Unknown(place) => Err(neither(place)),
         }
     }
 
-    fn crossings(&self, trace: &Trace, marker: &Marker) -> Result<Vec<f64>> {
+    fn crossings(&self, trace: &Trace, marker: &Marker) -> Result<Marks> {
         let mut scan = MarkerScan::new(marker);
         let mut sample = 0;
         let place = match trace {
