@@ -8,7 +8,8 @@ use runout_core::{
 /// Location errors between linear axes: symbol, axis along which the tool is displaced, axis whose position displaces it, sign.
 pub(crate) const SQUARENESS: [(&str, usize, usize, f64); 3] =
     [("EC0Y", 0, 1, -1.0), ("EB0Z", 0, 2, 1.0), ("EA0Z", 1, 2, -1.0)];
-const LETTERS: [&str; 3] = ["X", "Y", "Z"];
+/// The linear axes.
+pub(crate) const LETTERS: [&str; 3] = ["X", "Y", "Z"];
 
 /// Index of a linear axis.
 pub(crate) fn index(axis: &str) -> Option<usize> {

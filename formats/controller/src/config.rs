@@ -26,18 +26,37 @@ pub struct ControllerConfig {
     pub axis: Option<String>,
     /// Points of a table that the control has memory for; more are an error.
     pub most_points: Option<usize>,
-    /// siemens-cec: where a positive value of the table moves the axis. Write one table by hand and look: manuals differ.
+    /// siemens-cec, heidenhain, fanuc-pitch, fanuc-3d: where a positive value of the table moves the axis. Write one table by hand and look:
+    /// manuals differ.
     pub positive_moves: Option<Moves>,
     /// siemens-cec: index of the first table.
     #[serde(default)]
     pub first_table: usize,
-    /// siemens-cec: tables that the control has.
+    /// siemens-cec, heidenhain: tables (heidenhain: dependencies of one axis on another or on itself) that the control has.
     pub most_tables: Option<usize>,
     /// isg-csv, etalon: the point of the machine from which the control counts lever arms, in mm.
     #[serde(default)]
     pub arms_from_mm: [f64; 3],
+    /// heidenhain: names of the tables of compensation values, beside `path`, by the axis whose position counts: `{ X = "x.com" }`.
+    #[serde(default)]
+    pub com: BTreeMap<String, PathBuf>,
+    /// fanuc-pitch, fanuc-3d: detection unit of each axis, in mm or °: `{ X = 0.001 }`.
+    #[serde(default)]
+    pub detection_unit: BTreeMap<String, f64>,
+    /// fanuc-pitch, fanuc-3d: magnification of the values, parameter 3623 of pitch errors.
+    #[serde(default = "one")]
+    pub magnification: u32,
+    /// fanuc-pitch, fanuc-3d: largest value at a point, without its sign; 7 of pitch errors and 127 of boxes without it.
+    pub largest_value: Option<u32>,
+    /// fanuc-pitch: number of the first compensation point that the file may use.
+    #[serde(default)]
+    pub first_point: usize,
     /// klipper: height of the bed at which its mesh is computed, in mm.
     pub bed_z_mm: Option<f64>,
+}
+
+fn one() -> u32 {
+    1
 }
 
 /// A dialect.
@@ -56,6 +75,13 @@ pub enum DialectName {
     Linuxcnc,
     /// Klipper: skew correction and bed mesh.
     Klipper,
+    /// Heidenhain: tables of compensation values `.COM` and their assignment `.CMA` (`path`).
+    Heidenhain,
+    /// FANUC: stored pitch error compensation.
+    FanucPitch,
+    /// FANUC Series 30i: three-dimensional error compensation, values at the vertices of boxes.
+    #[serde(rename = "fanuc-3d")]
+    Fanuc3d,
 }
 
 impl DialectName {
@@ -69,6 +95,9 @@ impl DialectName {
             Self::Etalon => "etalon",
             Self::Linuxcnc => "linuxcnc",
             Self::Klipper => "klipper",
+            Self::Heidenhain => "heidenhain",
+            Self::FanucPitch => "fanuc-pitch",
+            Self::Fanuc3d => "fanuc-3d",
         }
     }
 }

@@ -15,7 +15,7 @@ use runout_core::{
 use crate::{
     chain::Chain,
     config::{ControllerConfig, DialectName},
-    dialects::dialect,
+    dialects::{Comments, dialect},
     header::header,
 };
 
@@ -37,12 +37,35 @@ impl StageConfig for ControllerConfig {
             if missing && self.dialect == dialect { Err(Fault::at("dialect", message)) } else { Ok(()) }
         };
         needs("axis", self.axis.is_none(), DialectName::Linuxcnc, "the axis of the file: `axis = \"X\"`")?;
+        for dialect in [DialectName::SiemensCec, DialectName::Heidenhain, DialectName::FanucPitch, DialectName::Fanuc3d]
+        {
+            needs(
+                "positive_moves",
+                self.positive_moves.is_none(),
+                dialect,
+                "where a positive value moves the axis: \"positive\" or \"negative\"",
+            )?;
+        }
         needs(
-            "positive_moves",
-            self.positive_moves.is_none(),
-            DialectName::SiemensCec,
-            "where a positive value moves the axis: \"positive\" or \"negative\"",
+            "com",
+            self.com.is_empty(),
+            DialectName::Heidenhain,
+            "the files of the axes whose positions count: `com = { X = \"x.com\" }`",
         )?;
+        for dialect in [DialectName::FanucPitch, DialectName::Fanuc3d] {
+            needs(
+                "detection_unit",
+                self.detection_unit.is_empty(),
+                dialect,
+                "that of each axis in mm or °: `detection_unit = { X = 0.001 }`",
+            )?;
+        }
+        if let Some((axis, unit)) = self.detection_unit.iter().find(|(_, unit)| !(unit.is_finite() && **unit > 0.0)) {
+            return Err(Fault::at("detection_unit", format!("expected a unit above 0 for {axis}, found {unit}")));
+        }
+        if self.magnification == 0 {
+            return Err(Fault::at("magnification", "expected at least 1, found 0"));
+        }
         needs(
             "bed_z_mm",
             self.bed_z_mm.is_none(),
@@ -56,13 +79,38 @@ impl StageConfig for ControllerConfig {
         if !is_file {
             return Err(Fault::at("path", "expected a file"));
         }
-        Ok(Box::new(Controller { path: context.path(&self.path), config: self }))
+        if let Some(file) = self.com.values().find(|file| file.file_name() != Some(file.as_os_str())) {
+            let message = format!("expected the name of a file beside `path`, found {}", file.display());
+            return Err(Fault::at("com", message));
+        }
+        let controller = Controller { path: context.path(&self.path), config: self };
+        let mut files = controller.files();
+        files.sort();
+        if let Some(pair) = files.windows(2).find(|pair| pair[0] == pair[1]) {
+            let key = if controller.config.dialect == DialectName::Heidenhain { "com" } else { "path" };
+            return Err(Fault::at(key, format!("two files of this export have the name {}", pair[0].display())));
+        }
+        Ok(Box::new(controller))
+    }
+}
+
+impl Controller {
+    /// The files that it writes: its own, those beside it, and the text about them.
+    fn files(&self) -> Vec<PathBuf> {
+        let mut all = vec![self.path.clone()];
+        if self.config.dialect == DialectName::Heidenhain {
+            all.extend(self.config.com.values().map(|file| self.path.with_file_name(file)));
+        }
+        if dialect(&self.config).comments() == Comments::Apart {
+            all.push(self.path.with_extension("txt"));
+        }
+        all
     }
 }
 
 struct Pending {
-    place: PendingFile,
-    object: String,
+    places: Vec<(PendingFile, PathBuf)>,
+    path: PathBuf,
     config: ControllerConfig,
     curves: ComponentCurves,
 }
@@ -77,22 +125,27 @@ impl Exporter for Controller {
     }
 
     fn outputs(&self, _tables: &[TableSpec]) -> Vec<PathBuf> {
-        vec![self.path.clone()]
+        self.files()
     }
 
     fn begin(&self, _result: &ResultInfo) -> Result<Box<dyn Export>> {
-        let place = PendingFile::new(&self.path)?;
-        let object = self.path.display().to_string();
-        Ok(Box::new(Pending { place, object, config: self.config.clone(), curves: ComponentCurves::default() }))
+        let places = self.files().into_iter().map(|file| Ok((PendingFile::new(&file)?, file)));
+        Ok(Box::new(Pending {
+            places: places.collect::<Result<_>>()?,
+            path: self.path.clone(),
+            config: self.config.clone(),
+            curves: ComponentCurves::default(),
+        }))
     }
 }
 
 impl Pending {
     fn refuse(&self, problem: String) -> Error {
-        Error::new("write", self.object.clone(), problem).of(ErrorKind::UnsuitableData)
+        Error::new("write", self.path.display().to_string(), problem).of(ErrorKind::UnsuitableData)
     }
 
-    fn text(&self, result: &Completed) -> Result<String> {
+    /// The files with their lines.
+    fn texts(&self, result: &Completed) -> Result<Vec<(PathBuf, Vec<String>)>> {
         if self.curves.nodes.is_empty() {
             return Err(self.refuse("the result has no component curves; its warnings say why".into()));
         }
@@ -117,10 +170,21 @@ impl Pending {
         let kept = whole.without(&self.config.leave_out);
         let written = dialect.write(&kept).map_err(|problem| self.refuse(problem))?;
         let said = header(&self.config, &*dialect, &whole, &kept, written.notes, result);
-        let said: Vec<String> = said.iter().map(|line| format!("{} {line}", dialect.comment())).collect();
-        let lines = written.lines;
-        let all = if dialect.comments_last() { [lines, said] } else { interleaved(lines, said) };
-        Ok(all.concat().join("\n") + "\n")
+        let marked = |[before, after]: [&str; 2]| -> Vec<String> {
+            said.iter().map(|line| format!("{before}{line}{after}")).collect()
+        };
+        let mut files: Vec<(PathBuf, Vec<String>)> =
+            written.beside.into_iter().map(|(file, lines)| (self.path.with_file_name(file), lines)).collect();
+        let lines = match dialect.comments() {
+            Comments::First(mark) => interleaved(written.lines, marked([&format!("{mark} "), ""])).concat(),
+            Comments::Last(before, after) => [written.lines, marked([before, after])].concat(),
+            Comments::Apart => {
+                files.push((self.path.with_extension("txt"), said));
+                written.lines
+            }
+        };
+        files.push((self.path.clone(), lines));
+        Ok(files)
     }
 }
 
@@ -138,8 +202,11 @@ impl Export for Pending {
     }
 
     fn finish(self: Box<Self>, result: &Completed) -> Result<Vec<PendingFile>> {
-        let text = self.text(result)?;
-        self.place.write(text.as_bytes())?;
-        Ok(vec![self.place])
+        let texts = self.texts(result)?;
+        for (place, file) in &self.places {
+            let lines = texts.iter().find(|(known, _)| known == file).map(|(_, lines)| lines.join("\n") + "\n");
+            place.write(lines.unwrap_or_default().as_bytes())?;
+        }
+        Ok(self.places.into_iter().map(|(place, _)| place).collect())
     }
 }

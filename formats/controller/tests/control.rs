@@ -20,10 +20,10 @@ use runout_spatial_error::{
     simulate::{Layout, Placement, Scenario, Simulated, SimulatedEffect, Tracker},
 };
 
-const ENDS_MM: [f64; 3] = [500.0, 400.0, 300.0];
+pub(crate) const ENDS_MM: [f64; 3] = [500.0, 400.0, 300.0];
 
 /// A machine with errors of all kinds, measured by a tracker: what the exporter gets, and the machine.
-fn measured(seed: u64) -> (Simulated, Outcome, Vec<TableSpec>) {
+pub(crate) fn measured(seed: u64) -> (Simulated, Outcome, Vec<TableSpec>) {
     let linear = |target: &str, order: u32, amplitude_um: f64| {
         let targets = [target.to_owned()];
         if target[1..2] == target[2..3] {
@@ -89,7 +89,7 @@ fn file(toml: &str, specs: &[TableSpec], outcome: &Outcome) -> String {
 }
 
 /// The error that is left is at most 1.15 times the expected one, and more than before where signs are reversed.
-fn check(name: &str, text: &str, made: &Simulated, adds_um: &dyn Fn([f64; 3]) -> Vector3<f64>) {
+pub(crate) fn check(name: &str, text: &str, made: &Simulated, adds_um: &dyn Fn([f64; 3]) -> Vector3<f64>) {
     let (before, expected) = (number_after(text, "before"), number_after(text, "after"));
     let raw = left_um(made, ENDS_MM, &|_| Vector3::zeros());
     let left = left_um(made, ENDS_MM, adds_um);

@@ -5,8 +5,10 @@
 use std::{env, fs, path::Path};
 
 use crate::support::{
-    controls::{Cec, EncComp, Klipper, Volumetric, between, linuxcnc},
+    all_of_curves, all_of_outcome,
+    controls::{Cec, EncComp, Klipper, Points, Volumetric, between, linuxcnc},
     of_curves, of_outcome,
+    tables::{Boxes, Heidenhain, Pitch},
 };
 use nalgebra::{Rotation3, Vector3};
 use runout_core::{
@@ -111,6 +113,43 @@ fn files_are_those_of_the_controls() {
     near(adds.y, 0.05);
 }
 
+#[test]
+fn tables_of_heidenhain_and_fanuc_are_those_of_the_controls() {
+    let curves = linear();
+    let angles = "\"EAX\", \"EBX\", \"ECX\", \"EBY\"";
+    let com = "com = { X = \"x.com\", Y = \"y.com\", Z = \"z.com\" }\naxes = { X = \"X1\" }\nzero_at = { X = 100.0 }";
+    let toml = format!("dialect = \"heidenhain\"\npositive_moves = \"positive\"\n{com}\nleave_out = [{angles}]");
+    let files = all_of_curves(&toml, &curves, false).unwrap();
+    for name in ["file.cma", "x.com", "y.com", "z.com", "file.txt"] {
+        is_golden(&format!("heidenhain-{name}"), &files[name]);
+    }
+    let adds = Heidenhain::read(&files, "file.cma", 1.0).adds_um([200.0, 100.0, 25.0]);
+    // EXX of 3 µm beside 1 µm at the place of no correction; EXY of −0.5 µm; Y turns x by −30 µrad · 50 mm.
+    near(adds.x, -2.0 + 0.5 + 1.5);
+    // EYX of 1 µm and EYY of 3 µm.
+    near(adds.y, -1.0 - 3.0);
+    let toml = format!(
+        "dialect = \"fanuc-pitch\"\npositive_moves = \"positive\"\ndetection_unit = {{ X = 0.001, Y = 0.0005, Z = 0.001 }}
+        zero_at = {{ X = 100.0 }}\nlargest_value = 12\nleave_out = [{angles}, \"EC0Y\", \"EB0Z\", \"EA0Z\", \"EYX\", \"EZX\", \"EXY\"]"
+    );
+    let text = of_curves(&toml, &curves, false).unwrap();
+    is_golden("fanuc-pitch.txt", &text);
+    let x = Pitch::read(&text, "X", 100.0, 1e-3);
+    // EXX is −4, 1, 3 µm at 0, 100, 200 mm: 5 µm ahead of where the reference position is, and 2 µm back.
+    for (at, adds) in [(0.0, 5.0), (100.0, 0.0), (150.0, -1.0), (200.0, -2.0)] {
+        near(1e3 * x.adds(at), adds);
+    }
+    // 6 µm over 100 mm.
+    near(1e3 * Pitch::read(&text, "Y", 0.0, 0.5e-3).adds(100.0), -6.0);
+    let toml = "dialect = \"fanuc-3d\"\npositive_moves = \"positive\"\ndetection_unit = { X = 0.0001, Y = 0.0001, Z = 0.0001 }";
+    let text = of_curves(toml, &curves, false).unwrap();
+    is_golden("fanuc-3d.csv", &text);
+    let adds = Boxes::read(&text, 1e-4).adds_um([200.0, 0.0, 50.0]);
+    // EXX of 3 µm; ECX of −20 µrad with 50 mm less of y: −1 µm; EBX of −5 µrad with 25 mm more of z: −0.125 µm; EXY of 0.5 µm;
+    // EBY of 8 µrad with 25 mm: 0.2 µm; EC0Y of 30 µrad with 50 mm less of y: 1.5 µm; EB0Z of −20 µrad with 25 mm: −0.5 µm.
+    near((adds.x + 3.0 - 1.0 - 0.125 + 0.5 + 0.2 + 1.5 - 0.5).abs().max(0.05), 0.05);
+}
+
 const BALLS: &str = "balls = [
     { id = 'P1', x_mm = 120, y_mm = 0, z_mm = 60 },
     { id = 'P2', x_mm = -50, y_mm = 95, z_mm = 110 },
@@ -146,25 +185,59 @@ fn a_rotary_axis_and_the_tool_that_follows_it_meet() {
     let cec = format!("dialect = \"siemens-cec\"\npositive_moves = \"negative\"\nleave_out = [{others}, \"ECC\"]");
     let cec = Cec::read(&of_outcome(&cec, &specs, &outcome).unwrap(), -1.0);
     assert!(enc.0["C"].1 && cec.tables.iter().all(|(input, _, _, turns)| input == "C" && *turns));
+    // A positive value moves the axis in its negative direction.
+    let siemens = |command: f64| -between(&enc.0["C"].0, command);
+    let tool = |command: f64| {
+        let of = |(_, output, points, _): &(String, String, Points, bool)| (output.clone(), -between(points, command));
+        cec.tables.iter().map(of).collect::<Vec<_>>()
+    };
+    meets("siemens", &siemens, &tool);
+    let heidenhain = format!(
+        "dialect = \"heidenhain\"\npositive_moves = \"negative\"\ncom = {{ C = \"c.com\" }}\nleave_out = [{others}]"
+    );
+    let files = all_of_outcome(&heidenhain, &specs, &outcome).unwrap();
+    let control = Heidenhain::read(&files, "file.cma", -1.0);
+    assert!(control.dependencies.len() == 4 && control.dependencies.iter().all(|(input, ..)| input == "C"));
+    let of = |command: f64| -> Vec<(String, f64)> {
+        control.dependencies.iter().map(|(_, output, points)| (output.clone(), -between(points, command))).collect()
+    };
+    let own = |command: f64| of(command).iter().find(|(output, _)| output == "C").unwrap().1;
+    let tool = |command: f64| of(command).into_iter().filter(|(output, _)| output != "C").collect();
+    meets("heidenhain", &own, &tool);
+    let fanuc =
+        "dialect = \"fanuc-pitch\"\npositive_moves = \"positive\"\ndetection_unit = { C = 0.0001 }\nlargest_value = 50";
+    let text = format!("{fanuc}\nfirst_point = 60\nleave_out = [{others}, \"EXC\", \"EYC\", \"EZC\"]");
+    let pitch = Pitch::read(&of_outcome(&text, &specs, &outcome).unwrap(), "C", 0.0, 1e-4);
+    assert_eq!(pitch.turn(), 0);
+    let zero = between(&enc.0["C"].0, 0.0);
+    for command in [0.0, 90.0, 202.5, 355.0] {
+        // 0.0001° and half of it.
+        let off = pitch.adds(command) - (siemens(command) + zero);
+        assert!(off.abs() < 1e-4, "{command}: {off}");
+    }
+    assert!((pitch.adds(-30.0) - pitch.adds(330.0)).abs() < 1e-9);
+}
+
+/// What the tool is off a ball by at all commands, without correction, with it, and with reversed signs.
+fn meets(name: &str, axis_deg: &dyn Fn(f64) -> f64, tool_mm: &dyn Fn(f64) -> Vec<(String, f64)>) {
     let ball = Vector3::new(150.0, 30.0, 80.0);
     let left = |sign: f64| -> f64 {
         let squares = (0..180).map(|step| {
             let command = 2.0 * f64::from(step);
-            // A positive value moves the axis in its negative direction.
-            let moved = command - sign * between(&enc.0["C"].0, command);
+            let moved = command + sign * axis_deg(command);
             let [x, y, z, turned] = axis_errors(moved);
             let actual = Rotation3::from_axis_angle(&Vector3::z_axis(), moved.to_radians() + 1e-6 * turned) * ball
                 + 1e-3 * Vector3::new(x, y, z);
             let mut tool = Rotation3::from_axis_angle(&Vector3::z_axis(), command.to_radians()) * ball;
-            for (_, output, points, _) in &cec.tables {
-                let along = ["X", "Y", "Z"].iter().position(|letter| letter == output).unwrap();
-                tool[along] -= sign * between(points, command);
+            for (output, adds) in tool_mm(command) {
+                let along = ["X", "Y", "Z"].iter().position(|letter| *letter == output).unwrap();
+                tool[along] += sign * adds;
             }
             1e6 * (actual - tool).norm_squared()
         });
         (squares.sum::<f64>() / 180.0).sqrt()
     };
     let (before, after, reversed) = (left(0.0), left(1.0), left(-1.0));
-    println!("before {before:.2}, after {after:.2}, reversed {reversed:.2} µm");
-    assert!(after < 0.12 * before && reversed > 1.8 * before, "{before} {after} {reversed}");
+    println!("{name}: before {before:.2}, after {after:.2}, reversed {reversed:.2} µm");
+    assert!(after < 0.12 * before && reversed > 1.8 * before, "{name}: {before} {after} {reversed}");
 }

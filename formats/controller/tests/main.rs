@@ -4,3 +4,4 @@
 mod control;
 mod files;
 mod support;
+mod tables;

@@ -44,7 +44,7 @@ pub(crate) struct Computed {
 /// Which machine is measured again.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Machine {
-    /// What was found, less the power that noise alone would have: what is left is raised most by noise.
+    /// What was found, less what noise alone may have made: what is left is raised most by noise.
     Least,
     /// What was found, with its noise: what is there is raised least.
     Most,

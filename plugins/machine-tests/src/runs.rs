@@ -20,7 +20,7 @@ const OUTLIER: f64 = 12.0;
 
 impl Approaches {
     /// Approaches that are not like the others of their target, in words.
-    pub(crate) fn outliers(&self, own_std: f64, unit: &str) -> Option<String> {
+    pub(crate) fn outliers(&self, own_std: f64, unit: &str, contain: &str) -> Option<String> {
         let mut farthest = (0.0, String::new());
         let mut squares = Vec::new();
         for (target, of_target) in self.targets.iter().zip(&self.deviations) {
@@ -40,7 +40,7 @@ impl Approaches {
         let (off, place) = farthest;
         (usual > 0.0 && own_std > 0.0 && off.abs() > OUTLIER * usual).then(|| {
             format!(
-                "{place} lies {off:+.2} {unit} from the others, {:.0} times what is usual: A and R contain it",
+                "{place} lies {off:+.2} {unit} from the others, {:.0} times what is usual: {contain}",
                 off.abs() / usual
             )
         })
@@ -51,17 +51,29 @@ impl Approaches {
     /// # Errors
     /// When there are fewer than two targets, a target was approached less than twice from a side, or a direction is neither 1 nor −1.
     pub(crate) fn of(points: &Points, target: &str, deviation: &str) -> Result<Self> {
+        let direction = points.column("direction").ok();
+        Self::of_rows(points, "", points.column(target)?, direction, points.column(deviation)?)
+    }
+
+    /// The same of some rows; `of_what` names them in an error.
+    pub(crate) fn of_rows(
+        points: &Points,
+        of_what: &str,
+        given: &[f64],
+        direction: Option<&[f64]>,
+        deviation: &[f64],
+    ) -> Result<Self> {
         let refuse = |problem: String, help: &str| {
+            let problem = if of_what.is_empty() { problem } else { format!("{of_what}: {problem}") };
             Error::new("evaluate", points.input.display().to_string(), problem)
                 .of(ErrorKind::InsufficientData)
                 .help(help.to_owned())
         };
-        let (given, deviation) = (points.column(target)?, points.column(deviation)?);
-        let side = match points.column("direction") {
-            Ok(column) => {
+        let side = match direction {
+            Some(column) => {
                 stated(column).map_err(|problem| refuse(problem, "1 is the positive direction, -1 the negative one"))?
             }
-            Err(_) => followed(given),
+            None => followed(given),
         };
         let mut targets = given.to_vec();
         targets.sort_by(f64::total_cmp);
@@ -101,6 +113,31 @@ impl Approaches {
         self.deviations.iter().flatten().map(Vec::len).min().unwrap_or(0)
     }
 
+    /// Correlation of the deviations at neighbouring targets within a run, without what the whole run is off by.
+    fn neighbours(&self, runs: usize, common: &[f64], along: &[f64]) -> f64 {
+        let (mut products, mut squares) = (0.0, 0.0);
+        let squares_along: f64 = along.iter().map(|place| place * place).sum();
+        for side in 0..self.sides.len() {
+            for (run, level) in common.iter().enumerate().take(runs) {
+                let left = |place: usize| {
+                    let cell = &self.deviations[place][side];
+                    cell[run] - mean(&cell[..runs]) - level
+                };
+                let course: Vec<f64> = (0..along.len()).map(left).collect();
+                let tilt = course.iter().zip(along).map(|(left, place)| left * place).sum::<f64>() / squares_along;
+                let level = mean(&course);
+                let course: Vec<f64> =
+                    course.iter().zip(along).map(|(left, place)| left - level - tilt * place).collect();
+                products += course.windows(2).map(|pair| pair[0] * pair[1]).sum::<f64>();
+                squares += course.iter().map(|left| left * left).sum::<f64>();
+            }
+        }
+        // Level and tilt are taken out: independent deviations have this correlation on average.
+        let count = along.len() as f64;
+        let usual = if count > 2.0 { -(2.0 - 4.0 / count) / (count - 2.0) } else { 0.0 };
+        if squares > 0.0 { products / squares - usual } else { 0.0 }
+    }
+
     /// What changes from run to run.
     pub(crate) fn noise(&self) -> Noise {
         let runs = self.fewest_runs();
@@ -128,6 +165,12 @@ impl Approaches {
         let freedom_own = ((cells - 2.0) as usize).max(1) * freedom;
         let of_runs = |squares: f64| (squares / freedom as f64).sqrt();
         Noise {
+            copies: self
+                .deviations
+                .iter()
+                .flatten()
+                .all(|runs| runs.iter().all(|one| one.to_bits() == runs[0].to_bits())),
+            neighbours: self.neighbours(runs, &common, &along),
             common_std: of_runs(common.iter().map(|level| level * level).sum()),
             slope_std: of_runs(slope),
             own_std: (own / freedom_own as f64).sqrt(),
@@ -151,6 +194,10 @@ pub(crate) struct Noise {
     pub along: Vec<f64>,
     pub runs: usize,
     pub freedom_own: usize,
+    /// Whether the runs are equal, digit by digit.
+    pub copies: bool,
+    /// Correlation at neighbouring targets within a run.
+    pub neighbours: f64,
 }
 
 impl Noise {

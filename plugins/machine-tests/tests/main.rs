@@ -3,4 +3,9 @@
 
 mod closed_forms;
 mod coverage;
+mod diagonals;
 mod drift;
+mod probing;
+mod rotary_path;
+mod structural;
+mod support;

@@ -69,6 +69,60 @@ pub(crate) fn points(name: &str) -> String {
                 }
             }
         }
+        // Five runs of each direction along two body diagonals and one of a face.
+        "diagonals" => {
+            text.push_str("diagonal,target_mm,deviation_um,direction\n");
+            for (diagonal, slope) in [("PPP", 0.012), ("NPP", -0.007), ("PP0", 0.020)] {
+                for _ in 0..5 {
+                    for direction in [1, -1] {
+                        for step in 0..11 {
+                            let step = if direction > 0 { step } else { 10 - step };
+                            let target_mm = 50.0 * f64::from(step) + 1.7 * f64::from(step % 3);
+                            let error = slope * target_mm + 2.0 * (target_mm / 90.0).cos() - 0.6 * f64::from(direction);
+                            let _ = writeln!(text, "{diagonal},{target_mm},{error},{direction}");
+                        }
+                    }
+                }
+            }
+        }
+        // Four sets of touches of a sphere of 15 mm, by a probe with three lobes.
+        "touches" => {
+            text.push_str("x_mm,y_mm,z_mm,repeat\n");
+            for repeat in 1..=4 {
+                for touch in 0..25 {
+                    let height = f64::from(touch) / 25.0;
+                    let (angle, across) = (2.4 * f64::from(touch), (1.0 - height * height).sqrt());
+                    let radius = 15.0 + 2e-3 * across * across * (3.0 * angle).cos();
+                    let [x, y] = [radius * across * angle.cos(), radius * across * angle.sin()];
+                    let _ = writeln!(text, "{x},{y},{},{repeat}", radius * height);
+                }
+            }
+        }
+        // Three passes of a table ahead and back: an axis that is off, a wave of it, and lost motion.
+        "rotary-path" => {
+            text.push_str("ball,c_deg,dx_mm,dy_mm,dz_mm,direction,repeat\n");
+            for repeat in 1..=3 {
+                for direction in [1, -1] {
+                    for step in 0..24 {
+                        let step = if direction > 0 { step } else { 23 - step };
+                        let angle = TAU * f64::from(step) / 24.0;
+                        let lost = 1e-3 * f64::from(direction);
+                        let [x, y] = [4e-3 + lost * angle.sin(), -2e-3 - lost * angle.cos()];
+                        let z = 3e-3 * (2.0 * angle).cos();
+                        let _ = writeln!(text, "P1,{},{x},{y},{z},{direction},{repeat}", 15.0 * f64::from(step));
+                    }
+                }
+            }
+        }
+        // Twenty seconds of a hum of 50 Hz that beats.
+        "vibration" => {
+            text.push_str("time_s,x_um,y_um\n");
+            for step in 0..4000 {
+                let time_s = f64::from(step) / 200.0;
+                let hum = (1.0 + 0.3 * (TAU * 1.7 * time_s).sin()) * (TAU * 47.3 * time_s).sin();
+                let _ = writeln!(text, "{time_s},{},{}", 0.4 * hum, 0.2 * hum);
+            }
+        }
         // Three turns ahead and three back, with lost motion and lobes.
         "path" => {
             text.push_str("angle_deg,deviation_um,direction\n");

@@ -6,7 +6,7 @@
 use runout_core::component_curves::symbols;
 
 use super::{
-    Dialect, Written, fixed,
+    Comments, Dialect, Written, fixed,
     isg::{errors, location, notes},
 };
 use crate::{chain::Chain, config::ControllerConfig};
@@ -14,8 +14,8 @@ use crate::{chain::Chain, config::ControllerConfig};
 pub(super) struct Etalon(pub ControllerConfig);
 
 impl Dialect for Etalon {
-    fn comment(&self) -> &'static str {
-        "//"
+    fn comments(&self) -> Comments {
+        Comments::First("//")
     }
 
     fn holds(&self, _symbol: &str) -> bool {
@@ -37,7 +37,7 @@ impl Dialect for Etalon {
                 lines.extend([format!("}} // end of {symbol}"), String::new()]);
             }
         }
-        Ok(Written { lines, notes: notes(&self.0) })
+        Ok(Written::one(lines, notes(&self.0)))
     }
 
     fn adds_um(&self, chain: &Chain, place_mm: [f64; 3]) -> [f64; 3] {

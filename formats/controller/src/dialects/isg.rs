@@ -5,7 +5,7 @@
 
 use runout_core::component_curves::symbols;
 
-use super::{Dialect, Written, fixed};
+use super::{Comments, Dialect, Written, fixed};
 use crate::{
     chain::{AxisCurves, Chain, cross, index},
     config::ControllerConfig,
@@ -48,8 +48,8 @@ pub(super) fn notes(config: &ControllerConfig) -> Vec<String> {
 }
 
 impl Dialect for IsgCsv {
-    fn comment(&self) -> &'static str {
-        "//"
+    fn comments(&self) -> Comments {
+        Comments::First("//")
     }
 
     fn holds(&self, _symbol: &str) -> bool {
@@ -74,7 +74,7 @@ impl Dialect for IsgCsv {
                 lines.push(format!("{} {}", fixed(axis.nodes[node].position, 6), numbers.join(" ")));
             }
         }
-        Ok(Written { lines, notes: notes(&self.0) })
+        Ok(Written::one(lines, notes(&self.0)))
     }
 
     fn adds_um(&self, chain: &Chain, place_mm: [f64; 3]) -> [f64; 3] {

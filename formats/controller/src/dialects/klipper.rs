@@ -4,7 +4,7 @@
 //! points with `mesh_x_pps` and `mesh_y_pps` 0. `axis_twist_compensation` is not written: it changes what a probe reads, not where the
 //! nozzle goes, and the mesh holds what a twist does on the bed.
 
-use super::{Dialect, Written, fixed};
+use super::{Comments, Dialect, Written, fixed};
 use crate::{
     chain::{AxisCurves, Chain, SQUARENESS},
     config::ControllerConfig,
@@ -28,8 +28,8 @@ fn axes(chain: &Chain) -> Result<[&AxisCurves; 2], String> {
 }
 
 impl Dialect for Klipper {
-    fn comment(&self) -> &'static str {
-        "#"
+    fn comments(&self) -> Comments {
+        Comments::First("#")
     }
 
     fn holds(&self, symbol: &str) -> bool {
@@ -72,7 +72,7 @@ impl Dialect for Klipper {
                 self.0.bed_z_mm.unwrap_or(0.0)
             ),
         ];
-        Ok(Written { lines, notes })
+        Ok(Written::one(lines, notes))
     }
 
     fn adds_um(&self, chain: &Chain, place_mm: [f64; 3]) -> [f64; 3] {

@@ -3,7 +3,7 @@
 //! Its source (`src/emc/motion/usrmotintf.cc`, `motion.h`): lines of nominal, forward and reverse position, nominal ascending, at most 256;
 //! the joint moves by nominal less forward (reverse). Reading stops at the first other line.
 
-use super::{Dialect, Written, few_enough, fixed, positions};
+use super::{Comments, Dialect, Written, few_enough, fixed, is_positioning, positions};
 use crate::{
     chain::{Chain, index},
     config::ControllerConfig,
@@ -21,17 +21,13 @@ impl Linuxcnc {
 }
 
 impl Dialect for Linuxcnc {
-    fn comment(&self) -> &'static str {
-        "#"
-    }
-
-    fn comments_last(&self) -> bool {
-        true
+    fn comments(&self) -> Comments {
+        Comments::Last("# ", "")
     }
 
     /// Errors of other axes are those of other files.
     fn holds(&self, symbol: &str) -> bool {
-        symbol.len() == 3 && symbol[1..2] == symbol[2..3] && symbol.ends_with(self.axis())
+        is_positioning(symbol) && symbol.ends_with(self.axis())
     }
 
     fn write(&self, chain: &Chain) -> Result<Written, String> {
@@ -43,7 +39,7 @@ impl Dialect for Linuxcnc {
             "COMP_FILE_TYPE = 0: nominal, forward and reverse position, in mm or °, of a machine in these units".to_owned(),
             "forward and reverse are equal: the curves do not tell directions apart; BACKLASH is ignored beside COMP_FILE".to_owned(),
         ];
-        Ok(Written { lines: points.iter().map(row).collect(), notes })
+        Ok(Written::one(points.iter().map(row).collect(), notes))
     }
 
     fn adds_um(&self, chain: &Chain, place_mm: [f64; 3]) -> [f64; 3] {

@@ -1,15 +1,21 @@
 //! What each control reads.
 
+mod cross;
 mod etalon;
+mod fanuc_3d;
+mod fanuc_pitch;
+mod heidenhain;
 mod isg;
 mod klipper;
 mod linuxcnc;
 mod siemens;
 
+use std::path::PathBuf;
+
 use runout_core::component_curves::symbols;
 
 use crate::{
-    chain::Chain,
+    chain::{Chain, LETTERS, index},
     config::{ControllerConfig, DialectName},
 };
 
@@ -19,17 +25,31 @@ pub(crate) struct Written {
     pub lines: Vec<String>,
     /// What one has to know of them.
     pub notes: Vec<String>,
+    /// Other files beside it.
+    pub beside: Vec<(PathBuf, Vec<String>)>,
+}
+
+impl Written {
+    fn one(lines: Vec<String>, notes: Vec<String>) -> Self {
+        Self { lines, notes, beside: Vec::new() }
+    }
+}
+
+/// Where a dialect has its comments.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Comments {
+    /// Before the data, each behind this mark.
+    First(&'static str),
+    /// After the data, where the control has stopped to read, each between these marks.
+    Last(&'static str, &'static str),
+    /// In a text file of their own: the control's tables have none.
+    Apart,
 }
 
 /// A dialect.
 pub(crate) trait Dialect {
-    /// Before a line that the control does not read.
-    fn comment(&self) -> &'static str;
-
-    /// Whether comments come after the data: the control stops to read at the first one.
-    fn comments_last(&self) -> bool {
-        false
-    }
+    /// Where what the header says goes.
+    fn comments(&self) -> Comments;
 
     /// Whether it holds an error.
     fn holds(&self, symbol: &str) -> bool;
@@ -51,6 +71,9 @@ pub(crate) fn dialect(config: &ControllerConfig) -> Box<dyn Dialect> {
         DialectName::Etalon => Box::new(etalon::Etalon(config)),
         DialectName::Linuxcnc => Box::new(linuxcnc::Linuxcnc(config)),
         DialectName::Klipper => Box::new(klipper::Klipper(config)),
+        DialectName::Heidenhain => Box::new(heidenhain::Heidenhain(config)),
+        DialectName::FanucPitch => Box::new(fanuc_pitch::FanucPitch(config)),
+        DialectName::Fanuc3d => Box::new(fanuc_3d::Fanuc3d(config)),
     }
 }
 
@@ -83,4 +106,27 @@ pub(crate) fn fixed(value: f64, digits: usize) -> String {
         Some(rest) if rest.bytes().all(|letter| matches!(letter, b'0' | b'.')) => rest.to_owned(),
         _ => text,
     }
+}
+
+/// Name of an axis at the control.
+pub(crate) fn name<'a>(config: &'a ControllerConfig, axis: &'a str) -> &'a str {
+    config.axes.get(axis).map_or(axis, String::as_str)
+}
+
+/// Whether a rotary axis has nodes over its whole turn.
+pub(crate) fn is_turn(rotary: bool, [from, to]: [f64; 2]) -> bool {
+    rotary && (to - from - 360.0).abs() < 1e-9
+}
+
+/// Whether an error is that of positioning.
+pub(crate) fn is_positioning(symbol: &str) -> bool {
+    symbol.len() == 3 && symbol[1..2] == symbol[2..3]
+}
+
+/// What positioning tables add to a command of the linear axes, in µm.
+pub(crate) fn positioning_adds_um(chain: &Chain, place_mm: [f64; 3]) -> [f64; 3] {
+    LETTERS.map(|letter| {
+        let own = index(letter).unwrap_or(0);
+        chain.axis(letter).map_or(0.0, |axis| -axis.at(place_mm[own])[own])
+    })
 }

@@ -3,32 +3,29 @@
 //! Function manual *Extended functions*, K3 (6FC5397-1BP40): linear between evenly spaced points, the value of the end beyond, modulo for a
 //! turn. Values in mm or °. A positive value of `$AA_ENC_COMP` moves the axis in its negative direction (808D, function manual).
 
-use runout_core::component_curves::{Carries, symbols};
-
-use super::{Dialect, Written, few_enough, fixed, positioning, positions};
+use super::{
+    Comments, Dialect, Written,
+    cross::{self, tables},
+    few_enough, fixed, is_positioning, is_turn, name, positioning_adds_um, positions,
+};
 use crate::{
-    chain::{Chain, SQUARENESS, index},
+    chain::Chain,
     config::{ControllerConfig, Moves},
 };
 
 /// Interpolation points of an axis that the 840D has at most by its machine data.
 const MOST_POINTS: usize = 5000;
-const LETTERS: [&str; 3] = ["X", "Y", "Z"];
 
 pub(super) struct EncComp(pub ControllerConfig);
 pub(super) struct Cec(pub ControllerConfig);
 
-fn name<'a>(config: &'a ControllerConfig, axis: &'a str) -> &'a str {
-    config.axes.get(axis).map_or(axis, String::as_str)
-}
-
 impl Dialect for EncComp {
-    fn comment(&self) -> &'static str {
-        ";"
+    fn comments(&self) -> Comments {
+        Comments::First(";")
     }
 
     fn holds(&self, symbol: &str) -> bool {
-        symbol.len() == 3 && symbol[1..2] == symbol[2..3]
+        is_positioning(symbol)
     }
 
     fn write(&self, chain: &Chain) -> Result<Written, String> {
@@ -52,63 +49,21 @@ impl Dialect for EncComp {
             notes.push(format!("{own}: MD38000 $MA_MM_ENC_COMP_MAX_POINTS[0,{own}] of at least {}", points.len()));
         }
         lines.push("M17".into());
-        Ok(Written { lines, notes })
+        Ok(Written::one(lines, notes))
     }
 
     fn adds_um(&self, chain: &Chain, place_mm: [f64; 3]) -> [f64; 3] {
-        LETTERS.map(|letter| {
-            let own = index(letter).unwrap_or(0);
-            chain.axis(letter).map_or(0.0, |axis| -axis.at(place_mm[own])[own])
-        })
+        positioning_adds_um(chain, place_mm)
     }
-}
-
-fn is_turn(rotary: bool, [from, to]: [f64; 2]) -> bool {
-    rotary && (to - from - 360.0).abs() < 1e-9
-}
-
-/// A table: input axis, output axis, its values in mm by which the output axis has to move.
-struct Table<'a> {
-    input: &'a str,
-    output: &'static str,
-    wanted_mm: Vec<f64>,
-}
-
-fn tables(chain: &Chain) -> Vec<Table<'_>> {
-    let mut tables = Vec::new();
-    for axis in &chain.axes {
-        for (error, output) in LETTERS.into_iter().enumerate() {
-            if axis.letter == output {
-                continue;
-            }
-            let own = index(&axis.letter);
-            let squareness = SQUARENESS.iter().find(|(_, moved, with, _)| *moved == error && own == Some(*with));
-            let line = |position: f64| {
-                squareness.map_or(0.0, |(symbol, _, with, sign)| {
-                    sign * 1e-3 * chain.location(symbol) * (position - chain.middle_mm(*with))
-                })
-            };
-            // The tool has to go back; a workpiece that is displaced has to be followed.
-            let sign = if axis.carries == Carries::Tool { -1.0 } else { 1.0 };
-            let wanted = axis.nodes.iter().map(|node| sign * 1e-3 * (node.errors[error] + line(node.position)));
-            let wanted_mm: Vec<f64> = wanted.collect();
-            if wanted_mm.iter().any(|value| value.abs() > 0.0) {
-                tables.push(Table { input: &axis.letter, output, wanted_mm });
-            }
-        }
-    }
-    tables
 }
 
 impl Dialect for Cec {
-    fn comment(&self) -> &'static str {
-        ";"
+    fn comments(&self) -> Comments {
+        Comments::First(";")
     }
 
     fn holds(&self, symbol: &str) -> bool {
-        let squareness = SQUARENESS.iter().any(|(known, ..)| *known == symbol);
-        let moves = LETTERS.contains(&symbol.get(1..2).unwrap_or_default());
-        squareness || (symbol.len() == 3 && moves && symbol[1..2] != symbol[2..3])
+        cross::holds(symbol)
     }
 
     fn write(&self, chain: &Chain) -> Result<Written, String> {
@@ -147,23 +102,10 @@ impl Dialect for Cec {
                 .push(format!("table {at}: MD18342 $MN_MM_CEC_MAX_POINTS[{at}] of at least {}", table.wanted_mm.len()));
         }
         lines.push("M17".into());
-        Ok(Written { lines, notes })
+        Ok(Written::one(lines, notes))
     }
 
     fn adds_um(&self, chain: &Chain, place_mm: [f64; 3]) -> [f64; 3] {
-        let mut adds = [0.0; 3];
-        for axis in chain.axes.iter().filter(|axis| !axis.rotary) {
-            let own = index(&axis.letter).unwrap_or(0);
-            let of = axis.at(place_mm[own]);
-            for (error, _) in symbols(&axis.letter).iter().take(3).enumerate() {
-                if error != positioning(&axis.letter) {
-                    adds[error] -= of[error];
-                }
-            }
-        }
-        for (symbol, moved, with, sign) in SQUARENESS {
-            adds[moved] -= sign * 1e-3 * chain.location(symbol) * (place_mm[with] - chain.middle_mm(with));
-        }
-        adds
+        cross::adds_um(chain, place_mm)
     }
 }

@@ -3,8 +3,9 @@
 #![allow(clippy::unwrap_used, dead_code, reason = "tests")]
 
 pub(crate) mod controls;
+pub(crate) mod tables;
 
-use std::{fs, path::Path};
+use std::{collections::BTreeMap, fs, path::Path};
 
 use nalgebra::{DMatrix, DVector, Vector3};
 use rand::{RngExt, SeedableRng};
@@ -41,10 +42,14 @@ pub(crate) fn exporter(toml: &str, folder: &Path) -> std::result::Result<Box<dyn
     built.map_err(|fault| fault.to_string())
 }
 
-/// The file that is written of tables, with values.
-pub(crate) fn written(toml: &str, tables: &[(TableSpec, TableRows)], values: &[(String, f64)]) -> Result<String> {
+/// The files that are written of tables, with values, by their names.
+fn all_written(
+    toml: &str,
+    tables: &[(TableSpec, TableRows)],
+    values: &[(String, f64)],
+) -> Result<BTreeMap<String, String>> {
     let folder = tempfile::tempdir().unwrap();
-    let toml = format!("plugin = \"controller\"\npath = \"file.txt\"\n{toml}");
+    let toml = format!("plugin = \"controller\"\npath = \"file.cma\"\n{toml}");
     let exporter = exporter(&toml, folder.path()).unwrap();
     let specs: Vec<TableSpec> = tables.iter().map(|(spec, _)| spec.clone()).collect();
     let mut export = exporter.begin(&ResultInfo { title: "Test machine".into(), tables: specs, longest_name: None })?;
@@ -55,23 +60,38 @@ pub(crate) fn written(toml: &str, tables: &[(TableSpec, TableRows)], values: &[(
     let completed =
         Completed { summary: &summary, about: &about, surface: None, heights: None, diagnosis: None, overview: None };
     commit_all(export.finish(&completed)?)?;
-    Ok(fs::read_to_string(folder.path().join("file.txt")).unwrap())
+    let files = fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap());
+    let named = files.map(|file| (file.file_name().into_string().unwrap(), fs::read_to_string(file.path()).unwrap()));
+    let named: BTreeMap<String, String> = named.collect();
+    let said: Vec<_> = exporter.outputs(&[]).into_iter().map(|file| file.file_name().unwrap().to_owned()).collect();
+    assert!(said.len() == named.len() && said.iter().all(|file| named.contains_key(file.to_str().unwrap())));
+    Ok(named)
 }
 
 /// Of curves.
 pub(crate) fn of_curves(toml: &str, curves: &ComponentCurves, rotary: bool) -> Result<String> {
+    Ok(all_of_curves(toml, curves, rotary)?.remove("file.cma").unwrap())
+}
+
+/// All files of curves.
+pub(crate) fn all_of_curves(toml: &str, curves: &ComponentCurves, rotary: bool) -> Result<BTreeMap<String, String>> {
     let spec = curves_table(rotary, "curves");
     let nodes = curves_rows(&spec, &curves.nodes).unwrap();
     let location = location_rows(&curves.location).unwrap();
-    written(toml, &[(spec, nodes), (location_table(), location)], &[])
+    all_written(toml, &[(spec, nodes), (location_table(), location)], &[])
 }
 
 /// Of the outcome of a separator.
 pub(crate) fn of_outcome(toml: &str, specs: &[TableSpec], outcome: &Outcome) -> Result<String> {
+    Ok(all_of_outcome(toml, specs, outcome)?.remove("file.cma").unwrap())
+}
+
+/// All files of the outcome of a separator.
+pub(crate) fn all_of_outcome(toml: &str, specs: &[TableSpec], outcome: &Outcome) -> Result<BTreeMap<String, String>> {
     let of = |rows: &TableRows| (specs.iter().find(|spec| spec.name == rows.table).unwrap().clone(), rows.clone());
     let tables: Vec<_> = outcome.tables.iter().map(of).collect();
     let value = |value: &runout_core::summary::Value| Some((value.symbol.clone(), value.number()?));
-    written(toml, &tables, &outcome.values.iter().filter_map(value).collect::<Vec<_>>())
+    all_written(toml, &tables, &outcome.values.iter().filter_map(value).collect::<Vec<_>>())
 }
 
 /// What `leave_out` has to name: as the error says it.
