@@ -17,8 +17,8 @@ use crate::{
 ///
 /// # Errors
 /// When a check of the pipeline fails.
-pub fn check(sources: &Sources, pipeline: &Pipeline, registry: &Registry) -> Result<Value, Failure> {
-    to_value(&checking::report(sources, pipeline, &registry.effects)?.0)
+pub fn check(sources: &Sources, pipeline: &Pipeline) -> Result<Value, Failure> {
+    to_value(&checking::report(sources, pipeline)?.0)
 }
 
 /// The document of `plan`, `simulate` or `inspect`, by the words of its command line without the program's name.

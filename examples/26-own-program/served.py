@@ -5,6 +5,8 @@ import runout.external
 
 
 class ThreePoint:
+    name = "three-point-in-numpy"
+
     def separate(self, station):
         sensors, setup = {sensor["id"]: sensor for sensor in station.rig["sensors"]}, station.rig["setups"][0]
         if len(station.sensors) != 3 or len(station.setups) != 1:
@@ -15,7 +17,7 @@ class ThreePoint:
         weights = np.sin(np.roll(theta, -2) - np.roll(theta, -1))
         with np.errstate(divide="ignore", invalid="ignore"):
             form = weights / (phase @ weights)[:, None]
-        motion = np.linalg.pinv(np.stack([np.cos(theta), np.sin(theta)], 1)) @ (np.eye(3) - phase[:, :, None] * form[:, None, :])
+            motion = np.linalg.pinv(np.stack([np.cos(theta), np.sin(theta)], 1)) @ (np.eye(3) - phase[:, :, None] * form[:, None, :])
         rows = np.concatenate([form[:, None, :], motion], 1)                                # [order, form x y, sensor]
         rows[~(np.linalg.norm(rows, axis=2) <= station.config.get("max_noise_gain", 30))] = np.nan
         rows[:2] = np.nan                                                                   # order 1 is eccentricity

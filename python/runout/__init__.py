@@ -20,6 +20,8 @@ from .result import Added, Comparison, Diagnosis, Level, Parameter, Plan, Result
 
 if TYPE_CHECKING:
     from . import checks as checks
+    from . import effects as effects
+    from . import evaluators as evaluators
     from . import exporters as exporters
     from . import external as external
     from . import loaders as loaders
@@ -27,7 +29,7 @@ if TYPE_CHECKING:
     from . import separators as separators
     from . import tables as tables
 
-_MODULES = ("checks", "exporters", "external", "loaders", "preprocessors", "separators", "tables")
+_MODULES = ("checks", "effects", "evaluators", "exporters", "external", "loaders", "preprocessors", "separators", "tables")
 
 
 def __getattr__(name: str) -> Any:

@@ -6,18 +6,21 @@ import json
 import os
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Union
+from typing import TYPE_CHECKING, Any, Union
 
 from . import _native, _toml
 from .pipeline import Data, Source, job
-from .plugins import Effect, Method, Separator
+from .plugins import Effect, Method, Separator, own
 from .result import Comparison, Diagnosis, Plan, Result
+
+if TYPE_CHECKING:
+    from .external import Served
 
 Progress = Callable[[int, int, str], object]
 """Called with the number of stations that are done, of all, and the name of the last one. What it raises stops the work."""
 Path = Union[str, os.PathLike[str]]
 Overrides = Mapping[str, Any]
-Plugin = Union[Separator, Effect]
+Plugin = Union[Separator, Effect, "Served"]
 
 
 def run(
@@ -35,7 +38,7 @@ def run(
     `pipeline` is a TOML file, a dictionary with its keys, or a `Pipeline`. `recording`, a
     `Recording` or `Points`, takes the place of its `[load]`. `set`
     overrides keys: `{"preprocess.0.cutoff_hz": 300}`. With `surface` the form over angle and z is kept as well; it is kept
-    in any case where an exporter or a value needs it. `plugins` are separators and effects of one's own (`runout.plugins`), which the pipeline
+    in any case where an exporter or a value needs it. `plugins` are separators, effects and other stages of one's own (`runout.plugins`), which the pipeline
     may name; what their code raises, the call raises.
 
     Raises `ConfigurationError` for a mistake in the pipeline, `DataError` for data and files. Ctrl-C stops it; nothing
@@ -75,9 +78,9 @@ def compare(
     """
     if isinstance(methods, str):
         raise TypeError("expected a list of separators, found a string")
-    own = [method for method in methods if not isinstance(method, str)]
-    names = [method if isinstance(method, str) else method.name for method in methods]
-    return Comparison(_document(job(pipeline, recording, set, [*plugins, *own]).call(_native.compare, names, threads, progress)))
+    objects = [method for method in methods if not isinstance(method, str)]
+    names = [method if isinstance(method, str) else own(method).name for method in methods]
+    return Comparison(_document(job(pipeline, recording, set, [*plugins, *objects]).call(_native.compare, names, threads, progress)))
 
 
 def check(

@@ -1,4 +1,4 @@
-"""Separators of turns and of points and exporters as programs: `serve(MySeparator())` makes one of a class.
+"""Separators, effects, evaluators, loaders of points and exporters as programs: `serve(MySeparator())` makes one of a class.
 
     class Mine:
         def separate(self, station):
@@ -9,12 +9,14 @@
         runout.external.serve(Mine())
 
 A pipeline names the script by `plugin = "external"`, `command = ["python3", "mine.py"]`. What the code raises ends the program with its traceback,
-which the error of the run quotes. `print` writes to stderr, which is shown beside the progress.
+which the error of the run quotes. `print` writes to stderr, which is shown beside the progress. The same object is a plugin of
+`runout.run(…, plugins=[Mine()])` without a process.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import io
 import json
 import sys
 from collections.abc import Mapping, Sequence
@@ -57,7 +59,7 @@ class Station:
 
 @dataclasses.dataclass(frozen=True)
 class Value:
-    """A value of measured points; `std` is None where no uncertainty is known."""
+    """A value; `std` is None where no uncertainty is known."""
 
     symbol: str
     value: float | None
@@ -65,6 +67,18 @@ class Value:
     unit: str
     of: str | None = None
     about: str | None = None
+
+
+@dataclasses.dataclass(frozen=True)
+class Column:
+    """A column that a separator takes of measured points."""
+
+    name: str
+    unit: str
+    kind: str
+    """`number`, `flag` (0 or 1), `label`, `trace` or `trace-kind` (texts)."""
+    about: str
+    optional: bool
 
 
 class TurnSeparator(Protocol):
@@ -76,12 +90,61 @@ class TurnSeparator(Protocol):
 
 
 class PointSeparator(Protocol):
-    """Values of measured points."""
+    """Values of measured points. As a plugin of a call it has `columns`, names of columns of numbers that it takes, and may have `labels`, those of
+    texts, and `symbols`, pairs of symbol and unit that limits may name."""
 
     def values(
         self, points: dict[str, npt.NDArray[Any]], config: dict[str, Any]
     ) -> Sequence[Value] | tuple[Sequence[Value], npt.ArrayLike]:
         """The values; and what the fit leaves of each point, in µm, where that is known."""
+
+
+class Effect(Protocol):
+    """A linear change of one channel, as `runout.plugins.Effect`."""
+
+    def transfer(self, orders: npt.NDArray[np.int64], *values: float) -> npt.ArrayLike:
+        """Reading over displacement at each of `orders` (from 0), never 0; 1 where all values are 0."""
+
+
+class Evaluator(Protocol):
+    """Values of a result. As a plugin of a call it has `symbols`, pairs of symbol and unit."""
+
+    def evaluate(self, tables: dict[str, pa.Table], config: dict[str, Any]) -> Sequence[Value]:
+        """The values, from all tables of the result by name, that of the standards' values among them."""
+
+
+class Loader(Protocol):
+    """Measured points of a file."""
+
+    def load(self, path: str, columns: Sequence[Column], config: dict[str, Any]) -> Mapping[str, npt.ArrayLike]:
+        """The columns by name, one entry a point: those asked for that are not optional, and others of them where the file has them."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Captured:
+    """One station in one setup of a recording."""
+
+    station: str
+    setup: str
+    samples: int
+    """Samples of each sensor."""
+    marks: npt.ArrayLike
+    """Ascending sample positions (fractional) at which a turn begins."""
+    z_mm: float = 0.0
+    """Carriage position, the same in all setups of a station."""
+    sample_rate_hz: float | None = None
+    speed_rpm: float | None = None
+
+
+class Recordings(Protocol):
+    """Recorded turns of a file."""
+
+    def captures(self, path: str, rig: dict[str, Any], config: dict[str, Any]) -> Sequence[Captured]:
+        """Each station in each setup."""
+
+    def samples(self, station: str, setup: str, first: int, count: int) -> npt.ArrayLike:
+        """So many samples from one on, `[sample, sensor]` with the sensors of the rig in their order, as the instrument reads them (their `sign` is
+        applied to them); NaN where one is not known. Blocks of several captures may be asked for in turns."""
 
 
 class Exporter(Protocol):
@@ -91,20 +154,129 @@ class Exporter(Protocol):
         """Writes each of `files` (name and path to write to); `summary` is that of `summary.json`."""
 
 
-def serve(separator: TurnSeparator | PointSeparator | Exporter, stdin: Optional[BinaryIO] = None, stdout: Optional[BinaryIO] = None) -> None:
+Served = Union[TurnSeparator, PointSeparator, Effect, Evaluator, Loader, Recordings, Exporter]
+
+_METHODS = {
+    "separate-turns": "separate",
+    "separate-points": "values",
+    "transfer": "transfer",
+    "evaluate": "evaluate",
+    "load-points": "load",
+    "load-samples": "captures",
+    "export": "export",
+}
+"""The method that a stage asks for."""
+
+
+def serve(plugin: Served, stdin: Optional[BinaryIO] = None, stdout: Optional[BinaryIO] = None) -> None:
     """Answers requests on stdin until it ends. Started from a terminal, which sends none, it ends and says how it is tried."""
     if stdin is None and sys.stdin.isatty():
         raise SystemExit(f"runout starts this program and sends it tables: try it by `runout plugins test -- python3 {sys.argv[0]}`")
     source, sink = stdin or sys.stdin.buffer, stdout or sys.stdout.buffer
     before, sys.stdout = sys.stdout, sys.stderr
     try:
-        given: dict[str, list[pa.Table]] = {}
-        while (tables := _request(source)) is not None:
-            frames = _export(separator, tables, given) if given or "files" in tables else _answer(separator, tables)
-            sink.write(b"".join(frames) + b"end 0\n")
+        answering = Answering(plugin)
+        while (request := _request(source)) is not None:
+            sink.write(answering.of(request))
             sink.flush()
     finally:
         sys.stdout = before
+
+
+class Answering:
+    """Answers the requests of a run by an object. It keeps the tables of a result until all of them are there."""
+
+    def __init__(self, plugin: Any) -> None:
+        self._plugin = plugin
+        self._given: dict[str, list[pa.Table]] = {}
+        self._about: dict[str, str] = {}
+
+    def answer(self, request: bytes) -> bytes:
+        """The bytes of the answer to those of a request."""
+        frames = _request(io.BytesIO(request))
+        return b"" if frames is None else self.of(frames)
+
+    def of(self, request: dict[str, Any]) -> bytes:
+        """The bytes of the answer to a request, by the names of its frames."""
+        return b"".join(self._frames(request)) + b"end 0\n"
+
+    def _frames(self, tables: dict[str, Any]) -> list[bytes]:
+        if "summary" in tables:
+            return self._complete(tables["summary"])
+        self._about = about = _about(next(iter(tables.values())))
+        if about["protocol"] != VERSION:
+            raise ValueError(f"expected version {VERSION} of the protocol, found {about['protocol']}")
+        method = _METHODS.get(about["stage"], "")
+        if not hasattr(self._plugin, method):
+            kind = type(self._plugin).__name__
+            raise TypeError(f"{kind} is asked for {about['stage']}: expected a class with the method `{method}`")
+        if method in ("export", "evaluate"):
+            for name, table in tables.items():
+                self._given.setdefault(name, []).append(table)
+            return []
+        frames: list[bytes] = getattr(self, f"_{method}")(tables, json.loads(about["config"]))
+        return frames
+
+    def _complete(self, summary: dict[str, Any]) -> list[bytes]:
+        """The answer to the last request of an evaluator or an exporter."""
+        given, self._given = self._given, {}
+        config = json.loads(self._about["config"])
+        (first,) = given.pop("symbols" if self._about["stage"] == "evaluate" else "files")
+        tables = {name: pa.concat_tables(parts) for name, parts in given.items()}
+        if self._about["stage"] == "evaluate":
+            return [_frame("values", _values(self._plugin.evaluate(tables, config)))]
+        paths = dict(zip(first["name"].to_pylist(), first["path"].to_pylist()))
+        self._plugin.export(tables, summary, paths, config)
+        return []
+
+    def _separate(self, tables: dict[str, pa.Table], _: dict[str, Any]) -> list[bytes]:
+        station = station_of(tables)
+        found = self._plugin.separate(station)
+        values, std = found if isinstance(found, tuple) else (found, {})
+        return [_frame("harmonics", harmonics(station, values, std)), *(_text("warning", text) for text in station.warnings)]
+
+    def _values(self, tables: dict[str, pa.Table], config: dict[str, Any]) -> list[bytes]:
+        points = {name: tables["points"][name].to_numpy() for name in tables["points"].column_names}
+        found = self._plugin.values(points, config)
+        values, left = found if isinstance(found, tuple) else (found, None)
+        frames = [_frame("values", _values(values))]
+        if left is not None:
+            left = np.asarray(left, float)
+            frames.append(_frame("residual", pa.table({"row": np.arange(len(left)), "residual_um": pa.array(left, mask=np.isnan(left))})))
+        return frames
+
+    def _transfer(self, tables: dict[str, pa.Table], _: dict[str, Any]) -> list[bytes]:
+        orders = tables["orders"]["order"].to_numpy().astype(np.int64)
+        found = np.asarray(self._plugin.transfer(orders, *json.loads(self._about["values"]).values()), np.complex128)
+        if found.shape != orders.shape:
+            raise ValueError(f"transfer: expected one number an order, {len(orders)}, found the shape {found.shape}")
+        return [_frame("transfer", pa.table({"order": orders, "re": found.real, "im": found.imag}))]
+
+    def _load(self, tables: dict[str, pa.Table], config: dict[str, Any]) -> list[bytes]:
+        wanted = [Column(**row) for row in tables["columns"].to_pylist()]
+        found = self._plugin.load(self._about["path"], wanted, config)
+        return [_frame("points", pa.table({name: np.asarray(column) for name, column in found.items()}))]
+
+
+    def _captures(self, tables: dict[str, pa.Table], config: dict[str, Any]) -> list[bytes]:
+        sensors = [sensor["id"] for sensor in json.loads(self._about["rig"])["sensors"]]
+        if "block" in tables:
+            (block,) = tables["block"].to_pylist()
+            read = np.asarray(self._plugin.samples(block["station"], block["setup"], block["first"], block["count"]), float)
+            if read.shape != (block["count"], len(sensors)):
+                raise ValueError(f"samples: expected the shape {(block['count'], len(sensors))}, found {read.shape}")
+            columns = {name: np.ascontiguousarray(read[:, channel]) for channel, name in enumerate(sensors)}
+            return [_frame("samples", pa.table({name: pa.array(of, mask=np.isnan(of)) for name, of in columns.items()}))]
+        found = list(self._plugin.captures(self._about["path"], json.loads(self._about["rig"]), config))
+        rows = [{field.name: getattr(one, field.name) for field in dataclasses.fields(Captured)} for one in found]
+        marks = [np.asarray(row.pop("marks"), float) for row in rows]
+        counts = [len(of) for of in marks]
+        places = {name: np.repeat([row[name] for row in rows], counts).tolist() for name in ("station", "setup")}
+        at = np.concatenate([*marks, np.empty(0)])
+        return [
+            _frame("captures", pa.Table.from_pylist(rows, schema=_CAPTURES)),
+            _frame("marks", pa.table({**places, "at": at}, schema=_MARKS)),
+        ]
 
 
 def _request(source: BinaryIO) -> dict[str, Any] | None:
@@ -118,45 +290,18 @@ def _request(source: BinaryIO) -> dict[str, Any] | None:
     return None
 
 
-def _export(exporter: Any, tables: dict[str, Any], given: dict[str, list[pa.Table]]) -> list[bytes]:
-    """Keeps the tables of a result, and has them written when the summary comes."""
-    if not hasattr(exporter, "export"):
-        raise TypeError(f"{type(exporter).__name__} is asked for export: expected a class with the method `export`")
-    if "summary" not in tables:
-        for name, table in tables.items():
-            given.setdefault(name, []).append(table)
-        return []
-    files = given.pop("files")[0]
-    paths = dict(zip(files["name"].to_pylist(), files["path"].to_pylist()))
-    config = json.loads(_about(files)["config"])
-    exporter.export({name: pa.concat_tables(parts) for name, parts in given.items()}, tables["summary"], paths, config)
-    return []
+def _values(values: Sequence[Value]) -> pa.Table:
+    columns = {field.name: [getattr(value, field.name) for value in values] for field in dataclasses.fields(Value)}
+    return pa.table(columns, schema=_VALUES)
 
 
-def _answer(separator: Any, tables: dict[str, pa.Table]) -> list[bytes]:
-    about = _about(next(iter(tables.values())))
-    stage = about["stage"]
-    if about["protocol"] != VERSION:
-        raise ValueError(f"expected version {VERSION} of the protocol, found {about['protocol']}")
-    if stage == "separate-turns" and hasattr(separator, "separate"):
-        station = station_of(tables)
-        found = separator.separate(station)
-        values, std = found if isinstance(found, tuple) else (found, {})
-        return [_frame("harmonics", harmonics(station, values, std)), *(_text("warning", text) for text in station.warnings)]
-    if stage == "separate-points" and hasattr(separator, "values"):
-        points = {name: tables["points"][name].to_numpy() for name in tables["points"].column_names}
-        found = separator.values(points, json.loads(about["config"]))
-        values, left = found if isinstance(found, tuple) else (found, None)
-        columns = {field.name: [getattr(value, field.name) for value in values] for field in dataclasses.fields(Value)}
-        frames = [_frame("values", pa.table(columns, schema=_VALUES))]
-        if left is not None:
-            left = np.asarray(left, float)
-            frames.append(_frame("residual", pa.table({"row": np.arange(len(left)), "residual_um": pa.array(left, mask=np.isnan(left))})))
-        return frames
-    method = {"separate-turns": "separate", "separate-points": "values"}.get(stage)
-    raise TypeError(f"{type(separator).__name__} is asked for {stage}: expected a class with the method `{method}`")
-
-
+_NUMBERS = ("z_mm", "sample_rate_hz", "speed_rpm")
+_CAPTURES = pa.schema([
+    (field.name, pa.float64() if field.name in _NUMBERS else pa.int64() if field.name == "samples" else pa.string())
+    for field in dataclasses.fields(Captured)
+    if field.name != "marks"
+])
+_MARKS = pa.schema([("station", pa.string()), ("setup", pa.string()), ("at", pa.float64())])
 _VALUES = pa.schema([(name, pa.float64() if name in ("value", "std") else pa.string()) for name in (f.name for f in dataclasses.fields(Value))])
 
 

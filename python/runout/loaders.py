@@ -198,7 +198,7 @@ class RotorModel:
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class External:
-    """Measured points by a program in any language"""
+    """Measured points or recorded turns by a program in any language"""
 
     plugin: ClassVar[str] = "external"
 
@@ -207,6 +207,9 @@ class External:
 
     config: Union[Mapping[str, Any], None] = None
     """What the program gets as `runout.config`: keys of its own."""
+
+    gives: Union[Union[Literal['points'], Literal['samples']], None] = None
+    """What it gives."""
 
     memory_mb: Union[int, None] = None
     """Most memory that the program may write to, in MB, on Linux; without it, as much as there is."""

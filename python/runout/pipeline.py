@@ -15,8 +15,8 @@ from .recording import Points, Recording, Station
 from .tables import Diagnose, Evaluate, Limit, Report, Rig, Surface
 
 Stage = Union[Mapping[str, Any], Any]
-"""An object of `runout.loaders`, `.preprocessors`, `.separators`, `.exporters` or `.checks`, or a dictionary with `plugin`. `separate` and `compare`
-take separators of one's own as well (`runout.plugins.Separator`)."""
+"""An object of `runout.loaders`, `.preprocessors`, `.separators`, `.evaluators`, `.exporters`, `.effects` or `.checks`, or a dictionary with `plugin`.
+`separate`, `compare` and `evaluator` take objects of one's own as well (`runout.plugins`), and so does `plugin` of a dictionary."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -31,7 +31,9 @@ class Pipeline:
     compare: Sequence[Stage] = ()
     surface: Union[Mapping[str, Any], Surface, None] = None
     evaluate: Union[Mapping[str, Any], Evaluate, None] = None
+    evaluator: Sequence[Stage] = ()
     limit: Sequence[Union[Mapping[str, Any], Limit]] = ()
+    effect: Sequence[Stage] = ()
     diagnose: Union[Mapping[str, Any], Diagnose, None] = None
     report: Union[Mapping[str, Any], Report, None] = None
     export: Sequence[Stage] = ()

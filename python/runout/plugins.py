@@ -1,9 +1,11 @@
-"""Separators and effects of one's own: objects that are passed to a call beside the stages that come with the package.
+"""Plugins of one's own: objects that are passed to a call beside the stages that come with the package.
 
     runout.run("pipeline.toml", plugins=[HalfTheSum()], set={"separate": {"plugin": "half-the-sum"}})
 
-An object with the method `operator` is a separator, one with `transfer` an effect. `name` is what pipelines call it, in kebab-case; the first line
-of the docstring of its class says what it does.
+One of its methods says what an object is: `operator` a separator that is a linear formula, `transfer` an effect; `separate` and `values` separators of
+turns and of points, `captures` a loader of recorded turns, `evaluate`, `load` and `export` what they say (`runout.external` has their types). `name` is what pipelines call it, in
+kebab-case; of other objects than formulas and effects it is that of the class without it. The first line of the docstring of its class says what it
+does.
 """
 
 from __future__ import annotations
@@ -12,12 +14,16 @@ import dataclasses
 import inspect
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, Protocol, Union
+from typing import TYPE_CHECKING, Any, Protocol, Union
 
 import numpy as np
 import numpy.typing as npt
 
 from ._native import Layout
+
+if TYPE_CHECKING:
+    # It needs pyarrow, which formulas do not.
+    from .external import PointSeparator, TurnSeparator
 
 NAME = re.compile("[a-z][a-z0-9]*(-[a-z0-9]+)*")
 
@@ -60,27 +66,78 @@ class Effect(Protocol):
         """
 
 
+METHODS = ("operator", "transfer", "separate", "values", "load", "captures", "evaluate", "export")
+"""The method that says what an object is."""
+_SEPARATORS = ("operator", "separate", "values")
+_EXPECTED = (
+    "an object with the method `operator`, `separate` or `values` (a separator), `transfer` (an effect), `evaluate`, `load`, `captures` or `export`"
+)
+
+
 @dataclasses.dataclass(frozen=True)
 class Own:
     """What the compiled part reads of a plugin."""
 
     name: str
     about: str
-    parameters: list[tuple[str, str, float]] | None
+    method: str
+    parameters: list[tuple[str, str, float]]
+    columns: list[str]
+    labels: list[str]
+    symbols: list[tuple[str, str]]
     plugin: Any
 
 
 def own(plugin: Any) -> Own:
-    """A separator or an effect, checked: TypeError and ValueError say what it lacks."""
+    """A plugin, checked: TypeError and ValueError say what it lacks."""
     kind = type(plugin).__name__
-    if isinstance(plugin, type) or not is_plugin(plugin):
-        raise TypeError(f"expected an object with the method `operator` (a separator) or `transfer` (an effect), found {kind}")
-    name = getattr(plugin, "name", None)
+    found = _methods(plugin)
+    if len(found) != 1:
+        several = f"one with {', '.join(found)}" if found else kind
+        raise TypeError(f"expected {_EXPECTED}, found {several}")
+    method = found[0]
+    # A formula and an effect are named in results.
+    name = getattr(plugin, "name", None if method in ("operator", "transfer") else _kebab(kind))
     if not isinstance(name, str) or not NAME.fullmatch(name):
         raise ValueError(f"{kind}: expected a `name` in kebab-case, as in \"half-the-sum\", found {name!r}")
     about = (inspect.getdoc(type(plugin)) or "").strip().partition("\n")[0] or "a plugin in Python"
-    if is_separator(plugin):
-        return Own(name, about, None, plugin)
+    columns, labels = (_names(plugin, key) if method == "values" else [] for key in ("columns", "labels"))
+    if method == "values" and not columns:
+        raise ValueError(f"{kind}: expected `columns`, names of the columns of numbers that it takes, as in [\"x_mm\"]")
+    symbols = _symbols(plugin) if method in ("values", "evaluate") else []
+    if method == "evaluate" and not symbols:
+        raise ValueError(f"{kind}: expected `symbols`, pairs of symbol and unit of its values, as in [(\"lobing\", \"um\")]")
+    parameters = _parameters(plugin) if method == "transfer" else []
+    return Own(name, about, method, parameters, columns, labels, symbols, plugin)
+
+
+def _methods(plugin: Any) -> list[str]:
+    # A dictionary has `values` too.
+    if isinstance(plugin, (type, str, Mapping)):
+        return []
+    return [method for method in METHODS if callable(getattr(plugin, method, None))]
+
+
+def _kebab(name: str) -> str:
+    return re.sub("(?<=[a-z0-9])(?=[A-Z])|_", "-", name).strip("-").lower()
+
+
+def _names(plugin: Any, key: str) -> list[str]:
+    names = getattr(plugin, key, ())
+    if isinstance(names, str) or not all(isinstance(name, str) for name in names):
+        raise ValueError(f"{type(plugin).__name__}: expected `{key}`, a list of names of columns, found {names!r}")
+    return list(names)
+
+
+def _symbols(plugin: Any) -> list[tuple[str, str]]:
+    try:
+        return [(str(symbol), str(unit)) for symbol, unit in getattr(plugin, "symbols", ())]
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"{type(plugin).__name__}: expected `symbols` of (symbol, unit): {error}") from None
+
+
+def _parameters(plugin: Any) -> list[tuple[str, str, float]]:
+    kind = type(plugin).__name__
     try:
         parameters = [(str(called), str(unit), float(size)) for called, unit, size in plugin.parameters]
     except (AttributeError, TypeError, ValueError) as error:
@@ -90,34 +147,29 @@ def own(plugin: Any) -> Own:
     neutral = np.asarray(plugin.transfer(np.arange(3), *(0.0 for _ in parameters)))
     if neutral.shape != (3,) or not np.allclose(neutral, 1):
         raise ValueError(f"{kind}: expected a transfer of 1 at each order where all values are 0, found {neutral}")
-    return Own(name, about, parameters, plugin)
-
-
-def is_separator(plugin: Any) -> bool:
-    """Whether an object is a separator of one's own."""
-    return callable(getattr(plugin, "operator", None)) and not isinstance(plugin, type)
-
-
-def is_plugin(plugin: Any) -> bool:
-    """Whether an object is a separator or an effect of one's own."""
-    return is_separator(plugin) or callable(getattr(plugin, "transfer", None))
+    return parameters
 
 
 def named(keys: Mapping[str, Any]) -> tuple[dict[str, Any], list[Any]]:
-    """The keys of a pipeline with separators of one's own in `separate` and `compare` by their names, and those objects."""
+    """The keys of a pipeline with objects of one's own in the places of stages by their names, and those objects."""
     found: list[Any] = []
 
     def by_name(stage: Any) -> Any:
-        if not is_separator(stage):
-            return stage
-        found.append(stage)
-        return {"plugin": own(stage).name}
+        if _methods(stage):
+            found.append(stage)
+            return {"plugin": own(stage).name}
+        if isinstance(stage, Mapping) and _methods(stage.get("plugin")):
+            found.append(stage["plugin"])
+            return {**stage, "plugin": own(stage["plugin"]).name}
+        return stage
 
     changed = dict(keys)
-    if "separate" in changed:
-        changed["separate"] = by_name(changed["separate"])
-    if isinstance(changed.get("compare"), (list, tuple)):
-        changed["compare"] = [by_name(stage) for stage in changed["compare"]]
+    for key in ("load", "separate"):
+        if key in changed:
+            changed[key] = by_name(changed[key])
+    for key in ("compare", "evaluator", "export"):
+        if isinstance(changed.get(key), (list, tuple)):
+            changed[key] = [by_name(stage) for stage in changed[key]]
     return changed, found
 
 
@@ -131,5 +183,5 @@ def checked(plugins: Iterable[Any]) -> list[Own]:
     return list(unique.values())
 
 
-Method = Union[str, Separator]
+Method = Union[str, Separator, "TurnSeparator", "PointSeparator"]
 """A separator, by its name or as an object."""

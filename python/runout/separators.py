@@ -473,6 +473,9 @@ class External:
     output_mb: Union[int, None] = None
     """Largest answer, in MB. Default: 64."""
 
+    symbols: Union[Sequence[Mapping[str, Any]], None] = None
+    """Values that it gives of measured points, and no others: those that `[[limit]]` may name."""
+
     timeout_s: Union[float, None] = None
     """Longest time for one answer, of a station or of all points, in s; the first one includes the start of the program. Default:
     60.0."""

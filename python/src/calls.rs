@@ -178,7 +178,7 @@ pub(crate) fn check(py: Python<'_>, mut job: Job) -> PyResult<String> {
     watched(py, None, &stop, move |_| {
         let registry = job.registry(&of_job)?;
         let (sources, pipeline) = job.build(&registry, of_job)?;
-        json(&documents::check(&sources, &pipeline, &registry)?)
+        json(&documents::check(&sources, &pipeline)?)
     })
 }
 

@@ -18,7 +18,9 @@ MODULES = {
     "loaders": ("load", "From files to recordings or points."),
     "preprocessors": ("preprocess", "From samples to profiles."),
     "separators": ("separate", "From profiles or points to form and motion."),
+    "evaluators": ("evaluator", "From the tables of a result to values."),
     "exporters": ("export", "From results to files."),
+    "effects": ("effect", "What models of a pipeline's own may lack."),
     "checks": ("check", "What `check` compares a pipeline with."),
 }
 TABLES = ("rig", "surface", "evaluate", "limit", "diagnose", "report")

@@ -1,9 +1,7 @@
 //! `runout check`: everything that can be said before a run.
 
 use runout_core::{
-    Error, ErrorKind,
-    effects::EffectCatalogue,
-    mains,
+    Error, ErrorKind, mains,
     pipeline::{
         Pipeline, Registry, Route,
         document::{Document, Sources},
@@ -27,7 +25,7 @@ use crate::{
 /// When the configuration is wrong, and when the data are there and do not fit it, after the report.
 pub(crate) fn execute(args: &PipelineArgs, json: bool, registry: &Registry) -> Result<(), Failure> {
     let (sources, pipeline) = pipeline(args, registry)?;
-    let (report, refused) = report(&sources, &pipeline, &registry.effects)?;
+    let (report, refused) = report(&sources, &pipeline)?;
     print(&report, json, render::check::text)?;
     refused.map_or(Ok(()), |error| Err(error.into()))
 }
@@ -36,11 +34,7 @@ pub(crate) fn execute(args: &PipelineArgs, json: bool, registry: &Registry) -> R
 ///
 /// # Errors
 /// When a check of it fails.
-pub(crate) fn report(
-    sources: &Sources,
-    pipeline: &Pipeline,
-    effects: &EffectCatalogue,
-) -> Result<(Report, Option<Error>), Failure> {
+pub(crate) fn report(sources: &Sources, pipeline: &Pipeline) -> Result<(Report, Option<Error>), Failure> {
     let mut notes = pipeline.assessment.as_ref().map(|assessment| assessment.notes.clone()).unwrap_or_default();
     notes.extend(pipeline.rig.as_ref().map(Rig::remarks).unwrap_or_default());
     let source = pipeline.loader.open(&pipeline.request());
@@ -75,7 +69,7 @@ pub(crate) fn report(
     }
     let separator = pipeline.route.point_separator();
     let foresight = match &pipeline.route {
-        Route::Turns { separator, .. } => separator.foresee(effects).transpose()?,
+        Route::Turns { separator, .. } => separator.foresee(&pipeline.effects).transpose()?,
         Route::Points { .. } => None,
     };
     let report = Report {
@@ -124,7 +118,7 @@ fn stages(sources: &Sources) -> Result<Vec<Stage>, Failure> {
     let document = Document::parse(sources)?;
     let root = document.root().get_ref();
     let mut stages = Vec::new();
-    for stage in ["load", "preprocess", "separate", "export", "check"] {
+    for stage in ["load", "preprocess", "separate", "evaluator", "export", "effect", "check"] {
         let name = |table: &DeValue| Some(table.get("plugin")?.get_ref().as_str()?.to_owned());
         let names: Vec<String> = match root.get(stage).map(Spanned::get_ref) {
             Some(DeValue::Array(tables)) => tables.iter().filter_map(|table| name(table.get_ref())).collect(),

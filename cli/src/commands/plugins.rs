@@ -76,9 +76,11 @@ pub(crate) fn entries(registry: &Registry) -> Vec<Entry> {
     add(&mut entries, "load", &registry.loaders);
     add(&mut entries, "preprocess", &registry.preprocessors);
     add(&mut entries, "separate", &registry.separators);
+    add(&mut entries, "evaluator", &registry.evaluators);
     add(&mut entries, "export", &registry.exporters);
     add(&mut entries, "simulate", &registry.simulators);
     add(&mut entries, "check", &registry.checks);
+    add(&mut entries, EFFECT, &registry.own_effects);
     entries.extend(registry.effects.iter().map(|effect| Entry {
         stage: EFFECT,
         name: effect.name,
@@ -108,7 +110,7 @@ fn add<S>(entries: &mut Vec<Entry>, stage: &'static str, catalogue: &Catalogue<S
         schema: plugin.schema().to_value(),
         place: match stage {
             "simulate" => "a scenario".into(),
-            "preprocess" | "export" | "check" => format!("[[{stage}]]"),
+            "preprocess" | "evaluator" | "export" | "check" | EFFECT => format!("[[{stage}]]"),
             stage => format!("[{stage}]"),
         },
     }));

@@ -87,7 +87,7 @@ pub(crate) struct TakenColumn {
 /// A plugin in its place.
 #[derive(Debug, Serialize, JsonSchema)]
 pub(crate) struct Stage {
-    /// The table's key: "load", "preprocess", "separate", "export", "check".
+    /// The table's key: "load", "preprocess", "separate", "evaluator", "export", "effect", "check".
     pub stage: &'static str,
     /// The plugin's name.
     pub plugin: String,

@@ -5,15 +5,23 @@ use std::path::{Component, Path, PathBuf};
 use runout_core::{
     fault::Fault,
     pipeline::{Context, StageConfig},
-    stage::{Exporter, Loader, Separator, require_rig},
+    stage::{Evaluator, Exporter, Loader, Separator, require_rig},
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
 use serde_json::{Map, Value};
 
 use crate::{
-    exporter::ProgramAsExporter, loader::ProgramAsLoader, points::ProgramForPoints, program::Program, session::Session,
+    evaluator::ExternalEvaluator,
+    exporter::ExternalExporter,
+    loader::ExternalLoader,
+    points::ExternalPointSeparator,
+    program::Program,
+    recording::ExternalRecordings,
+    responder::Responder,
+    session::Session,
     turns::TurnSeparator,
+    values::{Symbol, declared},
 };
 
 /// `[separate] plugin = "external"`.
@@ -28,6 +36,9 @@ pub struct ExternalSeparatorConfig {
     /// Columns of texts that it takes of measured points.
     #[serde(default)]
     pub labels: Vec<String>,
+    /// Values that it gives of measured points, and no others: those that `[[limit]]` may name.
+    #[serde(default)]
+    pub symbols: Vec<Symbol>,
     /// What the program gets as `runout.config`: keys of its own.
     #[serde(default)]
     pub config: Map<String, Value>,
@@ -42,11 +53,11 @@ pub struct ExternalSeparatorConfig {
     pub output_mb: u64,
 }
 
-fn default_timeout_s() -> f64 {
+pub(crate) fn default_timeout_s() -> f64 {
     60.0
 }
 
-fn default_output_mb() -> u64 {
+pub(crate) fn default_output_mb() -> u64 {
     64
 }
 
@@ -58,25 +69,91 @@ impl StageConfig for ExternalSeparatorConfig {
 
     fn check(self, context: &Context) -> Result<Separator, Fault> {
         let program = Program::new(self.command, context.folder, self.timeout_s, self.memory_mb, self.output_mb)?;
-        let (session, config) = (Session::new(program), Value::Object(self.config));
+        let (responder, config) = (Responder::from(program), Value::Object(self.config));
         match &self.columns {
-            Some(columns) => {
-                let separator = ProgramForPoints::new(session, config, columns, &self.labels)?;
-                Ok(Separator::Points(Box::new(separator)))
-            }
+            Some(columns) => points(responder, config, columns, &self.labels, &self.symbols),
             None if !self.labels.is_empty() => {
                 Err(Fault::at("labels", "turns have no columns").help("measured points need `columns` too"))
             }
-            None => {
-                let rig = require_rig(context.rig).map_err(|fault| {
-                    fault.help(
-                        "turns need sensors and setups in [rig]; measured points need `columns = [\"x_mm\", …]` here",
-                    )
-                })?;
-                Ok(Separator::Stations(Box::new(TurnSeparator::new(session, config, rig)?)))
+            None if !self.symbols.is_empty() => {
+                Err(Fault::at("symbols", "a separator of turns gives no values of its own")
+                    .help("measured points need `columns` too; an [[evaluator]] gives values of turns"))
             }
+            None => turns(responder, config, context).map_err(|fault| match context.rig {
+                Some(_) => fault,
+                None => fault.help(
+                    "turns need sensors and setups in [rig]; measured points need `columns = [\"x_mm\", …]` here",
+                ),
+            }),
         }
     }
+}
+
+/// A separator of the turns of a rig.
+///
+/// # Errors
+/// When there is no rig, or the protocol has no tables for it.
+pub(crate) fn turns(responder: Responder, config: Value, context: &Context) -> Result<Separator, Fault> {
+    let separator = TurnSeparator::new(Session::new(responder), config, require_rig(context.rig)?)?;
+    Ok(Separator::Stations(Box::new(separator)))
+}
+
+/// A separator of points.
+///
+/// # Errors
+/// When there are no columns of numbers, or a name is there twice.
+pub(crate) fn points(
+    responder: Responder,
+    config: Value,
+    columns: &[String],
+    labels: &[String],
+    symbols: &[Symbol],
+) -> Result<Separator, Fault> {
+    let symbols = declared(symbols)?;
+    let separator = ExternalPointSeparator::new(Session::new(responder), config, [columns, labels], symbols)?;
+    Ok(Separator::Points(Box::new(separator)))
+}
+
+/// A loader of points or of recorded turns.
+///
+/// # Errors
+/// When the path is empty.
+pub(crate) fn loader(
+    responder: Responder,
+    config: Value,
+    path: &Path,
+    gives: Gives,
+    context: &Context,
+) -> Result<Box<dyn Loader>, Fault> {
+    if path.as_os_str().is_empty() {
+        return Err(Fault::at("path", "expected the name of a file"));
+    }
+    let path = context.path(path);
+    Ok(match gives {
+        Gives::Points => Box::new(ExternalLoader { responder, config, path }),
+        Gives::Samples => Box::new(ExternalRecordings { responder, config, path }),
+    })
+}
+
+/// An exporter of files in a folder.
+///
+/// # Errors
+/// When the names of the files cannot be.
+pub(crate) fn exporter(
+    responder: Responder,
+    config: Value,
+    folder: &Path,
+    files: Vec<String>,
+    context: &Context,
+) -> Result<Box<dyn Exporter>, Fault> {
+    let is_name =
+        |name: &String| matches!(Path::new(name).components().collect::<Vec<_>>()[..], [Component::Normal(_)]);
+    let differ = files.iter().enumerate().all(|(at, name)| !files[..at].contains(name));
+    if files.is_empty() || !files.iter().all(is_name) || !differ {
+        let fault = Fault::at("files", "expected names of files in the folder `path`, at least one and none twice");
+        return Err(fault.help("files = [\"values.txt\"]"));
+    }
+    Ok(Box::new(ExternalExporter { responder, config, folder: context.path(folder), files }))
 }
 
 /// `[load] plugin = "external"`.
@@ -87,6 +164,9 @@ pub struct ExternalLoaderConfig {
     pub command: Vec<String>,
     /// The file that the program reads, relative to the TOML. Its checksum belongs to the result.
     pub path: PathBuf,
+    /// What it gives.
+    #[serde(default)]
+    pub gives: Gives,
     /// What the program gets as `runout.config`: keys of its own.
     #[serde(default)]
     pub config: Map<String, Value>,
@@ -101,20 +181,73 @@ pub struct ExternalLoaderConfig {
     pub output_mb: u64,
 }
 
+/// What a loader gives.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Gives {
+    /// Measured points.
+    #[default]
+    Points,
+    /// Samples of recorded turns.
+    Samples,
+}
+
 impl StageConfig for ExternalLoaderConfig {
     type Stage = Box<dyn Loader>;
 
     const NAME: &'static str = "external";
-    const ABOUT: &'static str = "measured points by a program in any language";
+    const ABOUT: &'static str = "measured points or recorded turns by a program in any language";
 
     fn check(self, context: &Context) -> Result<Self::Stage, Fault> {
-        if self.path.as_os_str().is_empty() {
-            return Err(Fault::at("path", "expected the name of a file"));
-        }
         let program = Program::new(self.command, context.folder, self.timeout_s, self.memory_mb, self.output_mb)?;
-        let (config, path) = (Value::Object(self.config), context.path(&self.path));
-        Ok(Box::new(ProgramAsLoader { program, config, path }))
+        loader(program.into(), Value::Object(self.config), &self.path, self.gives, context)
     }
+}
+
+/// `[[evaluator]] plugin = "external"`.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ExternalEvaluatorConfig {
+    /// The program and its arguments. It runs in the folder of the pipeline; a program whose name has a `/` is a path from there.
+    pub command: Vec<String>,
+    /// Values that it gives, at least one, and no others: `symbols = [{ symbol = "lobing", unit = "um" }]`. `[[limit]]` may name them.
+    pub symbols: Vec<Symbol>,
+    /// What the program gets as `runout.config`: keys of its own.
+    #[serde(default)]
+    pub config: Map<String, Value>,
+    /// Longest time for one answer, of one table of one station, in s; the first one includes the start of the program.
+    #[serde(default = "default_timeout_s")]
+    pub timeout_s: f64,
+    /// Most memory that the program may write to, in MB, on Linux; without it, as much as there is.
+    #[serde(default)]
+    pub memory_mb: Option<u64>,
+    /// Largest answer, in MB.
+    #[serde(default = "default_output_mb")]
+    pub output_mb: u64,
+}
+
+impl StageConfig for ExternalEvaluatorConfig {
+    type Stage = Box<dyn Evaluator>;
+
+    const NAME: &'static str = "external";
+    const ABOUT: &'static str = "values of a result by a program in any language";
+
+    fn check(self, context: &Context) -> Result<Self::Stage, Fault> {
+        let program = Program::new(self.command, context.folder, self.timeout_s, self.memory_mb, self.output_mb)?;
+        evaluator(program.into(), Value::Object(self.config), &self.symbols)
+    }
+}
+
+/// An evaluator of these values.
+///
+/// # Errors
+/// When there are none, or one is there twice.
+pub(crate) fn evaluator(responder: Responder, config: Value, symbols: &[Symbol]) -> Result<Box<dyn Evaluator>, Fault> {
+    if symbols.is_empty() {
+        let fault = Fault::at("symbols", "expected at least one value, found none");
+        return Err(fault.help("symbols = [{ symbol = \"lobing\", unit = \"um\" }]"));
+    }
+    Ok(Box::new(ExternalEvaluator { responder, config, symbols: declared(symbols)? }))
 }
 
 /// `[[export]] plugin = "external"`.
@@ -145,16 +278,8 @@ impl StageConfig for ExternalExporterConfig {
     const ABOUT: &'static str = "files of any format by a program in any language";
 
     fn check(self, context: &Context) -> Result<Self::Stage, Fault> {
-        let is_name =
-            |name: &String| matches!(Path::new(name).components().collect::<Vec<_>>()[..], [Component::Normal(_)]);
-        let differ = self.files.iter().enumerate().all(|(at, name)| !self.files[..at].contains(name));
-        if self.files.is_empty() || !self.files.iter().all(is_name) || !differ {
-            let fault = Fault::at("files", "expected names of files in the folder `path`, at least one and none twice");
-            return Err(fault.help("files = [\"values.txt\"]"));
-        }
         // An answer is no more than its end and warnings.
         let program = Program::new(self.command, context.folder, self.timeout_s, self.memory_mb, 1)?;
-        let (config, folder) = (Value::Object(self.config), context.path(&self.path));
-        Ok(Box::new(ProgramAsExporter { program, config, folder, files: self.files }))
+        exporter(program.into(), Value::Object(self.config), &self.path, self.files, context)
     }
 }

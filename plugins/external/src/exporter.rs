@@ -1,4 +1,4 @@
-//! An exporter that is a program: the tables of a result out, one request each; the program writes its files itself.
+//! An exporter: the tables of a result out, one request each; what answers writes its files itself.
 
 use std::path::PathBuf;
 
@@ -10,11 +10,11 @@ use runout_core::{
 };
 use serde_json::Value;
 
-use crate::{answer::Answer, frame::Frame, program::Program, session::Session, tables::encode};
+use crate::{answer::Answer, frame::Frame, responder::Responder, session::Session, tables::encode};
 
-/// A program that writes files of its own format.
-pub(crate) struct ProgramAsExporter {
-    pub program: Program,
+/// What writes files of a format of its own.
+pub(crate) struct ExternalExporter {
+    pub responder: Responder,
     pub config: Value,
     /// The folder of its files.
     pub folder: PathBuf,
@@ -22,7 +22,7 @@ pub(crate) struct ProgramAsExporter {
     pub files: Vec<String>,
 }
 
-impl Exporter for ProgramAsExporter {
+impl Exporter for ExternalExporter {
     fn takes(&self) -> Takes {
         Takes::Tables
     }
@@ -33,14 +33,15 @@ impl Exporter for ProgramAsExporter {
 
     fn begin(&self, result: &ResultInfo) -> Result<Box<dyn Export>> {
         let files = self.outputs(&[]).into_iter().map(PendingFile::new).collect::<Result<Vec<_>>>()?;
-        let export = ProgramExport {
-            session: Session::new(self.program.clone()),
+        let export = ExternalExport {
+            session: Session::new(self.responder.clone()),
             about: [
                 ("stage", "export".to_owned()),
                 ("config", self.config.to_string()),
                 ("title", result.title.clone()),
             ],
             object: self.folder.display().to_string(),
+            writer: self.responder.shown(),
             files,
         };
         export.announce(&self.files)?;
@@ -48,15 +49,17 @@ impl Exporter for ProgramAsExporter {
     }
 }
 
-/// An export under way. What the program has written under temporary names is removed with it.
-struct ProgramExport {
+/// An export under way. What was written under temporary names is removed with it.
+struct ExternalExport {
     session: Session,
     about: [(&'static str, String); 3],
     object: String,
+    /// What writes them, for messages.
+    writer: String,
     files: Vec<PendingFile>,
 }
 
-impl ProgramExport {
+impl ExternalExport {
     /// Tells the names of the files, and the paths to write them to.
     fn announce(&self, names: &[String]) -> Result<()> {
         let columns =
@@ -83,7 +86,7 @@ impl ProgramExport {
     }
 }
 
-impl Export for ProgramExport {
+impl Export for ExternalExport {
     fn rows(&mut self, table: &TableSpec, rows: &RecordBatch) -> Result<()> {
         self.ask_table(table, rows)
     }
@@ -94,7 +97,7 @@ impl Export for ProgramExport {
         self.ask(&Frame { name: "summary".into(), body: summary })?;
         for file in &self.files {
             if !file.path().is_file() {
-                let problem = "the program of plugin `external` did not write it";
+                let problem = format!("{} did not write it", self.writer);
                 return Err(file
                     .failure(problem)
                     .help("it writes each of `files` to the path that the table `files` gives"));

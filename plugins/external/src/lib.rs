@@ -1,24 +1,37 @@
-//! Stages that are programs of their own, in any language: tables go to their stdin and come from their stdout.
+//! Stages that are programs of their own, in any language: tables go to their stdin and come from their stdout. The same tables go to
+//! [code of this process](Code) and come from it.
 //!
 //! A request and an answer are [frames](frame) that end with `end 0`; `docs/external-programs.md` has the protocol.
 
 mod answer;
+mod code;
 mod config;
 mod conformance;
+mod effect;
+mod evaluator;
 mod exporter;
 mod frame;
 mod loader;
 mod points;
 mod process;
 mod program;
+mod recording;
+mod responder;
 mod said;
 mod session;
 mod tables;
 mod turns;
+mod values;
 
-pub use config::{ExternalExporterConfig, ExternalLoaderConfig, ExternalSeparatorConfig};
+pub use code::{CodeKind, register_code};
+pub use config::{
+    ExternalEvaluatorConfig, ExternalExporterConfig, ExternalLoaderConfig, ExternalSeparatorConfig, Gives,
+};
 pub use conformance::{Check, Conformance, Found};
+pub use effect::{EffectParameter, ExternalEffectConfig};
 pub use process::end_all;
+pub use responder::{Answers, Code};
+pub use values::{Symbol, lasting};
 
 use runout_core::pipeline::{Plugin, Registry};
 
@@ -26,5 +39,7 @@ use runout_core::pipeline::{Plugin, Registry};
 pub fn register(registry: &mut Registry) {
     registry.loaders.add(Plugin::of::<ExternalLoaderConfig>());
     registry.separators.add(Plugin::of::<ExternalSeparatorConfig>());
+    registry.evaluators.add(Plugin::of::<ExternalEvaluatorConfig>());
     registry.exporters.add(Plugin::of::<ExternalExporterConfig>());
+    registry.own_effects.add(Plugin::of::<ExternalEffectConfig>());
 }

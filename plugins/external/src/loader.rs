@@ -1,4 +1,4 @@
-//! A loader of points that is a program: the columns that are wanted out, points in.
+//! A loader of points: the columns that are wanted out, points in.
 
 use std::path::PathBuf;
 
@@ -14,19 +14,19 @@ use serde_json::Value;
 use crate::{
     answer::Answer,
     frame::Frame,
-    program::Program,
+    responder::Responder,
     session::Session,
     tables::{Table, encode},
 };
 
-/// A program that reads a file of its own format.
-pub(crate) struct ProgramAsLoader {
-    pub program: Program,
+/// What reads a file of a format of its own.
+pub(crate) struct ExternalLoader {
+    pub responder: Responder,
     pub config: Value,
     pub path: PathBuf,
 }
 
-impl ProgramAsLoader {
+impl ExternalLoader {
     fn request(&self, wanted: &[PointColumn]) -> Result<Vec<u8>> {
         let columns =
             [("name", "name of a column"), ("unit", "its unit"), ("kind", "what it holds"), ("about", "what it is")];
@@ -55,14 +55,14 @@ impl ProgramAsLoader {
     }
 }
 
-impl Loader for ProgramAsLoader {
+impl Loader for ExternalLoader {
     fn kind(&self) -> SourceKind {
         SourceKind::Points
     }
 
     fn open(&self, wanted: &Request) -> Result<Source> {
         let input = InputFile::new(&self.path)?;
-        let session = Session::new(self.program.clone());
+        let session = Session::new(self.responder.clone());
         let object = self.path.display().to_string();
         let request = self.request(wanted.columns)?;
         let mut points = session.answer(("read", &object), request, |answer| points(answer, wanted.columns))?;

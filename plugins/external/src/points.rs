@@ -1,16 +1,12 @@
-//! A separator of points that is a program: points out, values and a residual in.
+//! A separator of points: points out, values and a residual in.
 
-use std::{
-    collections::HashSet,
-    sync::{Mutex, PoisonError},
-};
+use std::collections::HashSet;
 
 use runout_core::{
     Error, Result,
     fault::Fault,
     points::{PointColumn, PointKind, Points},
     stage::{Outcome, PointSeparator},
-    summary::Value,
     table::{ArrayRef, ColumnSpec, Figure, Measure, TableRows, TableSpec, counts, numbers, numbers_or_null, texts},
 };
 use serde_json::Value as Json;
@@ -20,30 +16,31 @@ use crate::{
     frame::Frame,
     session::Session,
     tables::{Table, encode},
+    values::{Symbols, VALUES, lasting, values},
 };
 
-const VALUES: [&str; 6] = ["symbol", "of", "value", "std", "unit", "about"];
 const RESIDUAL: [&str; 2] = ["row", "residual_um"];
 /// Units that a column's name may end in.
 const UNITS: [&str; 8] = ["mm", "um", "nm", "deg", "rad", "urad", "s", "m"];
 
-/// A program for measured points.
-pub(crate) struct ProgramForPoints {
+/// A separator of measured points.
+pub(crate) struct ExternalPointSeparator {
     session: Session,
     config: Json,
     columns: Vec<PointColumn>,
+    symbols: Symbols,
 }
 
-impl ProgramForPoints {
-    /// For columns of numbers and of texts.
+impl ExternalPointSeparator {
+    /// For columns of numbers and of texts; where symbols are declared, it gives no other values.
     ///
     /// # Errors
     /// When there are no numbers, or a name is there twice.
     pub(crate) fn new(
         session: Session,
         config: Json,
-        numbers: &[String],
-        labels: &[String],
+        [numbers, labels]: [&[String]; 2],
+        symbols: Symbols,
     ) -> std::result::Result<Self, Fault> {
         if numbers.is_empty() {
             return Err(Fault::at("columns", "expected at least one column of numbers").help("columns = [\"x_mm\"]"));
@@ -62,7 +59,7 @@ impl ProgramForPoints {
                 columns.push(PointColumn::needed(lasting(name), kind, unit.unwrap_or(""), about));
             }
         }
-        Ok(Self { session, config, columns })
+        Ok(Self { session, config, columns, symbols })
     }
 
     fn request(&self, points: &Points) -> Result<Vec<u8>> {
@@ -88,7 +85,7 @@ impl ProgramForPoints {
     }
 }
 
-impl PointSeparator for ProgramForPoints {
+impl PointSeparator for ExternalPointSeparator {
     fn columns(&self) -> Vec<PointColumn> {
         self.columns.clone()
     }
@@ -97,48 +94,30 @@ impl PointSeparator for ProgramForPoints {
         vec![residual()]
     }
 
+    fn symbols(&self) -> Symbols {
+        self.symbols.clone()
+    }
+
     fn notes(&self) -> Vec<String> {
-        vec!["a program separates: what it observes is known after the run".into()]
+        vec!["an external separator: what it observes is known after the run".into()]
     }
 
     fn separate(&self, points: &Points) -> Result<Outcome> {
         let object = points.input.display().to_string();
         let count = points.columns.first().map_or(0, |column| column.values.len());
-        self.session.answer(("separate", &object), self.request(points)?, |answer| outcome(answer, count))
+        self.session
+            .answer(("separate", &object), self.request(points)?, |answer| outcome(answer, count, &self.symbols))
     }
 }
 
 /// What an answer says of so many points.
-fn outcome(answer: &[Frame], count: usize) -> std::result::Result<Outcome, String> {
-    let answer = Answer::of(answer, &["values", "residual"])?;
-    let table = Table::decode(answer.table("values").ok_or("gave no table `values`")?, &VALUES)?;
-    let [symbol, of] = ["symbol", "of"].map(|name| table.texts(name));
-    let symbol = table.needed("symbol", symbol)?;
-    let value = table.needed("value", table.numbers("value"))?;
-    let unit = table.needed("unit", table.texts("unit"))?;
-    let (of, std, about) = (of?, table.numbers("std")?, table.texts("about")?);
-    let mut values: Vec<Value> = Vec::new();
-    for row in 0..table.count() {
-        let text = |column: &Option<Vec<Option<String>>>| column.as_ref().and_then(|column| column[row].clone());
-        let Some(symbol) = symbol[row].as_deref().filter(|symbol| !symbol.is_empty()) else {
-            return Err(format!("gave row {} of `values` without a symbol", row + 1));
-        };
-        let std = std.as_ref().and_then(|std| std[row]);
-        if std.is_some_and(|std| std < 0.0) {
-            return Err(format!("gave {symbol} with a `std` below 0"));
-        }
-        let [number, deviation] = [value[row], std].map(|number| number.unwrap_or(f64::NAN));
-        let about = text(&about).unwrap_or_else(|| "by a program".into());
-        let mut found = Value::new(symbol, number, deviation, unit[row].as_deref().unwrap_or(""), &about);
-        found.of = text(&of);
-        if values.iter().any(|known| known.symbol == found.symbol && known.of == found.of) {
-            return Err(format!("gave {symbol} {} twice", found.of.unwrap_or_default()));
-        }
-        if std.is_none() {
-            found.no_uncertainty = Some("the program gives no `std`".into());
-        }
-        values.push(found);
-    }
+fn outcome(
+    answer: &[Frame],
+    count: usize,
+    symbols: &[(&'static str, &'static str)],
+) -> std::result::Result<Outcome, String> {
+    let answer = Answer::of(answer, &[VALUES, "residual"])?;
+    let values = values(&answer, symbols)?;
     let mut tables = Vec::new();
     if let Some(frame) = answer.table("residual") {
         let table = Table::decode(frame, &RESIDUAL)?;
@@ -150,7 +129,7 @@ fn outcome(answer: &[Frame], count: usize) -> std::result::Result<Outcome, Strin
         let rows = residual().rows(vec![counts(row), numbers_or_null(left)]).map_err(|error| error.to_string())?;
         tables.push(TableRows { table: residual().name, rows });
     }
-    let convention = "values and residuals are those of a program".into();
+    let convention = "values and residuals are those of an external separator".into();
     Ok(Outcome { convention, tables, values, remarks: answer.warnings, ..Outcome::default() })
 }
 
@@ -160,16 +139,4 @@ fn residual() -> TableSpec {
     TableSpec::new("residual", "what the program's fit leaves of each point", vec![row, left])
         .optional()
         .figure(Figure::lines("residual", "Residual", "row", [Measure::new("residual_um")]))
-}
-
-/// A name that lasts as long as the process, as names of columns do; kept once, however often it is asked for.
-fn lasting(name: &str) -> &'static str {
-    static KNOWN: Mutex<Vec<&'static str>> = Mutex::new(Vec::new());
-    let mut known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
-    if let Some(text) = known.iter().find(|text| **text == name) {
-        return text;
-    }
-    let text: &'static str = Box::leak(name.into());
-    known.push(text);
-    text
 }

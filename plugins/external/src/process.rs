@@ -41,6 +41,7 @@ pub(crate) struct Process {
     requests: Option<Sender<Vec<u8>>>,
     answers: Receiver<Result<Frame, NoFrame>>,
     said: Arc<Said>,
+    program: Program,
 }
 
 impl Process {
@@ -78,15 +79,15 @@ impl Process {
             thread::spawn(move || read(stdout, output_bytes, |frame| to_take.send(frame).is_ok()));
             thread::spawn(move || heard.gather(stderr));
         }
-        Ok(Self { child, requests: Some(requests), answers, said })
+        Ok(Self { child, requests: Some(requests), answers, said, program: program.clone() })
     }
 
     /// Asks and waits for the answer, without its end.
     ///
     /// # Errors
     /// When there is none, or none in time. The program has then ended.
-    pub(crate) fn ask(&mut self, request: Vec<u8>, program: &Program) -> Result<Vec<Frame>, Failure> {
-        let deadline = Instant::now() + program.timeout;
+    pub(crate) fn ask(&mut self, request: Vec<u8>) -> Result<Vec<Frame>, Failure> {
+        let deadline = Instant::now() + self.program.timeout;
         if let Some(requests) = &self.requests {
             // A program that reads no more has ended or fails to answer.
             let _ = requests.send(request);
@@ -103,7 +104,7 @@ impl Process {
                 Err(RecvTimeoutError::Disconnected) => Some(NoFrame::Ended),
                 Err(RecvTimeoutError::Timeout) => None,
             };
-            return Err(self.failure(trouble, program));
+            return Err(self.failure(trouble));
         }
     }
 
@@ -113,11 +114,11 @@ impl Process {
     }
 
     /// Ends it and says why it gave no answer.
-    fn failure(&mut self, trouble: Option<NoFrame>, program: &Program) -> Failure {
+    fn failure(&mut self, trouble: Option<NoFrame>) -> Failure {
         // One whose output has ended is about to exit; any other is stopped.
         let ended = matches!(trouble, Some(NoFrame::Ended | NoFrame::CutOff { .. }));
         let status = self.end(if ended { GRACE } else { Duration::ZERO }).filter(|_| ended);
-        let said = self.said.end(GRACE);
+        let (said, program) = (self.said.end(GRACE), &self.program);
         let megabytes = |bytes: u64| bytes as f64 / 1e6;
         let bad = |problem: String| Failure::answer(problem);
         let mut failure = match trouble {

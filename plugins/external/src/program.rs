@@ -5,7 +5,7 @@ use std::{
     time::Duration,
 };
 
-use runout_core::{Error, ErrorKind, fault::Fault};
+use runout_core::{ErrorKind, fault::Fault};
 
 /// Longest time for one answer: a day.
 const LONGEST_S: f64 = 86_400.0;
@@ -105,13 +105,5 @@ impl Program {
     /// How it is tried without a pipeline, for messages.
     pub(crate) fn trial(&self) -> String {
         format!("`runout plugins test -- {}` tries a separator of turns on simulated data", self.shown())
-    }
-
-    /// A failure as an error of an operation on an object.
-    pub(crate) fn error(&self, operation: &str, object: &str, failure: &Failure) -> Error {
-        let Failure { kind, problem, help, said } = failure;
-        let said = if said.is_empty() { String::new() } else { format!("; its stderr ends with: {said}") };
-        let problem = format!("the program `{}` of plugin `external` {problem}{said}", self.shown());
-        Error::new(operation, object, problem).of(*kind).help(help)
     }
 }

@@ -1,33 +1,33 @@
-//! One process for all questions of a run.
+//! One session for all questions of a run: of a program, one process.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use runout_core::Result;
+use runout_core::{Error, Result};
 
 use crate::{
     frame::Frame,
-    process::Process,
-    program::{Failure, Program},
+    program::Failure,
+    responder::{Responder, Running},
 };
 
-/// A program that starts with the first question.
+/// A session that begins with the first question.
 pub(crate) struct Session {
-    program: Program,
+    responder: Responder,
     state: Mutex<State>,
 }
 
 enum State {
     Idle,
-    Running(Process),
+    Running(Running),
     Failed(Failure),
 }
 
 impl Session {
-    pub(crate) fn new(program: Program) -> Self {
-        Self { program, state: Mutex::new(State::Idle) }
+    pub(crate) fn new(responder: impl Into<Responder>) -> Self {
+        Self { responder: responder.into(), state: Mutex::new(State::Idle) }
     }
 
-    /// Asks, and reads the answer; questions from several threads wait for each other. A program that failed is not asked again.
+    /// Asks, and reads the answer; questions from several threads wait for each other. What failed is not asked again.
     ///
     /// # Errors
     /// When there is no answer, or it cannot be read: why, in words that go on from "the program".
@@ -38,10 +38,10 @@ impl Session {
     ) -> std::result::Result<T, Failure> {
         let mut state = self.locked();
         if matches!(*state, State::Idle) {
-            *state = Process::start(&self.program).map_or_else(State::Failed, State::Running);
+            *state = self.responder.start().map_or_else(State::Failed, State::Running);
         }
         let answer = match &mut *state {
-            State::Running(process) => process.ask(request, &self.program),
+            State::Running(running) => running.ask(request),
             State::Failed(failure) => return Err(failure.clone()),
             State::Idle => Err(Failure::answer("was not started")),
         };
@@ -53,7 +53,7 @@ impl Session {
     /// Lines of its stderr that nobody has taken yet.
     pub(crate) fn lines(&self) -> Vec<String> {
         match &*self.locked() {
-            State::Running(process) => process.lines(),
+            State::Running(running) => running.lines(),
             _ => Vec::new(),
         }
     }
@@ -68,7 +68,15 @@ impl Session {
         request: Vec<u8>,
         read: impl FnOnce(&[Frame]) -> std::result::Result<T, String>,
     ) -> Result<T> {
-        self.ask(request, read).map_err(|failure| self.program.error(operation, object, &failure))
+        self.ask(request, read).map_err(|failure| self.responder.error(operation, object, &failure))
+    }
+
+    /// Why it gave no answer, once it has not.
+    pub(crate) fn failure(&self, operation: &str, object: &str) -> Option<Error> {
+        match &*self.locked() {
+            State::Failed(failure) => Some(self.responder.error(operation, object, failure)),
+            _ => None,
+        }
     }
 
     fn locked(&self) -> MutexGuard<'_, State> {

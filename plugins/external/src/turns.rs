@@ -24,11 +24,11 @@ const HARMONICS: [&str; 7] = ["station", "quantity", "section", "order", "re", "
 
 /// What is not known before the program is asked.
 const NOTES: [&str; 2] = [
-    "a program separates: which orders it loses, and ±, are known after the run",
-    "E_n against a program is not known: nothing says how its estimates follow from the readings",
+    "an external separator: which orders it loses, and ±, are known after the run",
+    "E_n against an external separator is not known: nothing says how its estimates follow from the readings",
 ];
 
-/// A program for one rig.
+/// A separator for one rig.
 pub(crate) struct TurnSeparator {
     session: Session,
     config: Value,
@@ -179,9 +179,9 @@ impl TurnSeparator {
         let unknown_noise = observable.iter().zip(&variance).filter(|(seen, variance)| **seen && variance.is_nan());
         match unknown_noise.count() {
             0 => {}
-            _ if rows.std.is_none() => warnings.push("the program gives no `std`: there is no ±".into()),
+            _ if rows.std.is_none() => warnings.push("the separator gives no `std`: there is no ±".into()),
             count => {
-                warnings.push(format!("the program gives no `std` of {count} harmonics: what they enter has no ±"));
+                warnings.push(format!("the separator gives no `std` of {count} harmonics: what they enter has no ±"));
             }
         }
         let z_mm = |index: usize| self.rig.section_z_mm(index) + station.z_mm;
@@ -335,7 +335,7 @@ fn covariance() -> TableSpec {
 }
 
 /// The rig as programs get it: angles and places. Signs, units and gains are applied to the readings.
-fn rig_of(rig: &Rig) -> Value {
+pub(crate) fn rig_of(rig: &Rig) -> Value {
     let sensors: Vec<Value> = rig
         .sensors
         .iter()

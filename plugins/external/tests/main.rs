@@ -2,9 +2,12 @@
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
 mod conformance;
+mod effect;
+mod evaluator;
 mod exporter;
 mod hostile;
 mod loader;
 mod points;
+mod recording;
 mod support;
 mod three_point;

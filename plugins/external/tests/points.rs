@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
-use std::{fmt::Write, fs, path::Path};
+use std::{fmt::Write, fs, path::Path, process::Command};
 
 use crate::support::{of_repository, python, registry};
 use runout_core::{Result, pipeline::Pipeline, summary::Summary};
@@ -21,12 +21,15 @@ fn sphere(points: usize, added_um: impl Fn(usize) -> f64) -> String {
 }
 
 fn run(python: &str, script: &Path, folder: &Path, points: &str) -> Result<Summary> {
+    run_program(&format!("[{python:?}, {:?}]", script.display().to_string()), folder, points)
+}
+
+fn run_program(command: &str, folder: &Path, points: &str) -> Result<Summary> {
     fs::write(folder.join("points.csv"), points).unwrap();
     let text = format!(
         "load = {{ plugin = \"points\", path = \"points.csv\" }}\n\
-         separate = {{ plugin = \"external\", command = [{python:?}, {:?}], columns = [\"x_mm\", \"y_mm\", \"z_mm\"], labels = [\"ball\"] }}\n\
-         export = [{{ plugin = \"parquet\", path = \"out\" }}]\n",
-        script.display().to_string()
+         separate = {{ plugin = \"external\", command = {command}, columns = [\"x_mm\", \"y_mm\", \"z_mm\"], labels = [\"ball\"] }}\n\
+         export = [{{ plugin = \"parquet\", path = \"out\" }}]\n"
     );
     Pipeline::from_toml(&text, folder, &registry()).map_err(|error| error.to_string()).unwrap().run()
 }
@@ -87,5 +90,43 @@ fn what_cannot_be_is_an_error_in_words() {
     fs::write(&own, text.replace("\"std\": std, ", "")).unwrap();
     let found = run(&python, &own, folder.path(), &sphere(40, |_| 0.0)).unwrap();
     assert!(found.values.iter().all(|value| value.uncertainty.is_none()));
-    assert_eq!(found.values[0].no_uncertainty.as_deref(), Some("the program gives no `std`"));
+    assert_eq!(found.values[0].no_uncertainty.as_deref(), Some("the plugin gives no `std`"));
+}
+
+/// The program in C++ with the Arrow of pyarrow, where a compiler is there.
+#[test]
+fn the_sphere_in_cpp_is_that_in_python() {
+    let Some(python) = python() else { return };
+    let code = "import glob, pyarrow as pa; folder = pa.get_library_dirs()[0]; \
+                print(pa.get_include(), folder, glob.glob(folder + '/libarrow.so.*')[0], sep='\\n')";
+    let found = Command::new(&python).args(["-c", code]).output().unwrap();
+    let found = String::from_utf8(found.stdout).unwrap();
+    let [include, libraries, arrow] = found.lines().collect::<Vec<_>>()[..] else {
+        return println!("skipped: pyarrow comes without its library for C++");
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let program = folder.path().join("sphere");
+    let built = Command::new("c++")
+        .args(["-std=c++20", "-O1", "-o"])
+        .arg(&program)
+        .arg(of_repository("examples/26-own-program/sphere.cpp"))
+        .args([&format!("-I{include}"), arrow, &format!("-Wl,-rpath,{libraries}")])
+        .output();
+    let Ok(built) = built else { return println!("skipped: there is no c++") };
+    let said = String::from_utf8_lossy(&built.stderr);
+    if !built.status.success() {
+        assert!(!said.contains("sphere.cpp:"), "{said}");
+        return println!("skipped: {said}");
+    }
+    let points = sphere(40, |index| if index * index % 7 < 3 { 1.0 } else { -1.0 });
+    let cpp = run_program(&format!("[{:?}]", program.display().to_string()), folder.path(), &points).unwrap();
+    let script = of_repository("examples/26-own-program/sphere.py");
+    let expected = run(&python, &script, folder.path(), &points).unwrap();
+    assert_eq!(cpp.values.len(), 4);
+    for (one, other) in cpp.values.iter().zip(&expected.values) {
+        let [a, b] = [one, other].map(|value| (value.value, value.std().unwrap()));
+        assert!((a.0 - b.0).abs() < 1e-9 && (a.1 / b.1 - 1.0).abs() < 1e-6, "{a:?} {b:?}");
+    }
+    let few = run_program(&format!("[{:?}]", program.display().to_string()), folder.path(), &sphere(3, |_| 0.0));
+    assert!(few.unwrap_err().to_string().contains("expected 5 points or more, found 3"));
 }

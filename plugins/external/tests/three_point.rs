@@ -57,7 +57,7 @@ fn a_program_is_equal_to_the_same_method_that_is_built_in() {
         println!("{rotation}: {harmonics} harmonics of 3 stations differ by at most {worst:.1e} µm");
         assert!(worst < 1e-9 && harmonics > 400);
         let notes = comparison.methods[1].notes.join("; ");
-        assert!(notes.contains("E_n against a program is not known"), "{notes}");
+        assert!(notes.contains("E_n against an external separator is not known"), "{notes}");
     }
 }
 
@@ -103,7 +103,7 @@ fn without_std_there_is_no_uncertainty_and_a_reason() {
     );
     let summary = pipeline(folder.path(), &rig("ccw"), &stages).run().unwrap();
     let text = summary.warnings.join("\n");
-    assert!(text.contains("the program gives no `std`: there is no ±"), "{text}");
+    assert!(text.contains("the separator gives no `std`: there is no ±"), "{text}");
     let station = &summary.stations[0];
     assert!(station.sections[0].form_std_um.is_none() && !station.sections[0].values.is_empty(), "{station:?}");
     assert!(station.sections[0].values.iter().all(|value| value.uncertainty.is_none()), "no ± where none is known");

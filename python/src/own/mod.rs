@@ -1,14 +1,16 @@
-//! Separators and effects that are Python objects: registered by their names for one call, beside those that are compiled in.
+//! Plugins that are Python objects: registered by their names for one call, beside those that are compiled in.
 //!
-//! Both are asked for arrays over all orders at once, and seldom: a separator once a run, an effect once for each of its values. What their
-//! code raises stops the work, and the call raises it with its traceback.
+//! A formula is asked for arrays over all orders at once, once a run; an effect once for each of its values. What an external program may be,
+//! an object is by the same requests and answers (`runout.external.Answering`). What their code raises stops the work, and the call raises it
+//! with its traceback.
 
+mod code;
 mod effect;
 mod separator;
 
-use std::{
-    collections::HashSet,
-    sync::{Arc, Mutex, PoisonError},
+use std::sync::{
+    Arc,
+    atomic::{AtomicBool, Ordering},
 };
 
 use numpy::{Complex64, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
@@ -19,10 +21,15 @@ use runout_core::{
     pipeline::{Plugin, Registry},
     stage::Separator,
 };
-use runout_spindle::{effects, separators::MethodConfig};
+use runout_external::{CodeKind, Gives, Symbol, lasting, register_code};
+use runout_spindle::{
+    effects::{self, ChannelEffect},
+    separators::MethodConfig,
+};
 
 use crate::work::Stop;
-use effect::OwnEffect;
+use code::OwnCode;
+use effect::OwnTransfer;
 pub(crate) use separator::Layout;
 use separator::OwnSeparator;
 
@@ -31,8 +38,16 @@ use separator::OwnSeparator;
 pub(crate) struct Own {
     name: String,
     about: String,
-    /// Name, unit and tolerance of each parameter of an effect; `None` of a separator.
-    parameters: Option<Vec<(String, String, f64)>>,
+    /// The method that says what it is: "operator", "transfer", "separate", "values", "load", "captures", "evaluate" or "export".
+    method: String,
+    /// Name, unit and tolerance of each parameter of an effect.
+    parameters: Vec<(String, String, f64)>,
+    /// Columns of numbers that a separator of points takes.
+    columns: Vec<String>,
+    /// Columns of texts that it takes.
+    labels: Vec<String>,
+    /// Symbols and units of values.
+    symbols: Vec<(String, String)>,
     plugin: Py<PyAny>,
 }
 
@@ -41,45 +56,54 @@ pub(crate) struct Own {
 /// # Errors
 /// When a name is taken.
 pub(crate) fn register(registry: &mut Registry, plugins: Vec<Own>, stop: &Stop) -> Result<(), Failure> {
-    for Own { name, about, parameters, plugin } in plugins {
-        let taken = registry.separators.iter().any(|known| known.name == name)
-            || registry.effects.iter().any(|known| known.name == name);
-        if taken {
+    for Own { name, about, method, parameters, columns, labels, symbols, plugin } in plugins {
+        if is_taken(registry, &name, &method) {
             let message = format!("there is a plugin `{name}` already");
             return Err(Failure::Name { message, help: "give the object another `name`".into() });
         }
         let (name, about) = (lasting(&name), lasting(&about));
-        let object = Arc::new(Object { name, plugin, stop: stop.clone() });
-        match parameters {
-            None => registry.separators.add(separator(about, object)),
-            Some(parameters) => {
+        let object = Arc::new(Object { name, plugin, stop: stop.clone(), raised: AtomicBool::new(false) });
+        let symbols = symbols.into_iter().map(|(symbol, unit)| Symbol { symbol, unit }).collect();
+        let kind = match &*method {
+            "operator" => {
+                registry.separators.add(formula(about, object));
+                continue;
+            }
+            "transfer" => {
                 let parameter = |(name, unit, tolerance)| Parameter { name, unit, tolerance };
                 let parameters = parameters.into_iter().map(parameter).collect();
-                registry.effects.add(effects::entry(Arc::new(OwnEffect::new(about, parameters, object))));
+                let effect = ChannelEffect::new(name, about, parameters, OwnTransfer(object));
+                registry.effects.add(effects::entry(Arc::new(effect)));
+                continue;
             }
-        }
+            "values" => CodeKind::Points { columns, labels, symbols },
+            "load" => CodeKind::Loader(Gives::Points),
+            "captures" => CodeKind::Loader(Gives::Samples),
+            "evaluate" => CodeKind::Evaluator(symbols),
+            "export" => CodeKind::Exporter,
+            _ => CodeKind::Turns,
+        };
+        register_code(registry, (name, about), kind, Arc::new(OwnCode(object)));
     }
     Ok(())
 }
 
-/// The plugin of a separator, with the keys that all formulas have.
-fn separator(about: &'static str, object: Arc<Object>) -> Plugin<Separator> {
+/// Whether a plugin of the same stage has a name.
+fn is_taken(registry: &Registry, name: &str, method: &str) -> bool {
+    match method {
+        "transfer" => registry.effects.iter().any(|known| known.name == name),
+        "load" | "captures" => registry.loaders.iter().any(|known| known.name == name),
+        "evaluate" => registry.evaluators.iter().any(|known| known.name == name),
+        "export" => registry.exporters.iter().any(|known| known.name == name),
+        _ => registry.separators.iter().any(|known| known.name == name),
+    }
+}
+
+/// The plugin of a formula, with the keys that all formulas have.
+fn formula(about: &'static str, object: Arc<Object>) -> Plugin<Separator> {
     Plugin::made(object.name, about, move |config: MethodConfig<Object>, context| {
         Ok(Separator::Stations(Box::new(OwnSeparator::new(&config, context, &object)?)))
     })
-}
-
-/// A text that lasts as long as the process, as names of plugins do; kept once, however often it is asked for.
-fn lasting(text: &str) -> &'static str {
-    static KNOWN: Mutex<Option<HashSet<&'static str>>> = Mutex::new(None);
-    let mut known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
-    let known = known.get_or_insert_default();
-    if let Some(text) = known.get(text) {
-        return text;
-    }
-    let text: &'static str = Box::leak(text.into());
-    known.insert(text);
-    text
 }
 
 /// A Python object, and what to stop when its code raises.
@@ -87,15 +111,22 @@ struct Object {
     name: &'static str,
     plugin: Py<PyAny>,
     stop: Stop,
+    raised: AtomicBool,
 }
 
 impl Object {
+    /// Whether its code has raised.
+    fn has_raised(&self) -> bool {
+        self.raised.load(Ordering::Relaxed)
+    }
+
     /// Asks it with the interpreter's lock held. `None` where its code raises: the work stops then, and the call raises that.
     fn ask<T>(&self, question: impl FnOnce(Python<'_>, &Bound<'_, PyAny>) -> PyResult<T>) -> Option<T> {
         let asked = Python::try_attach(|py| question(py, self.plugin.bind(py)));
         match asked? {
             Ok(answer) => Some(answer),
             Err(error) => {
+                self.raised.store(true, Ordering::Relaxed);
                 self.stop.raise(error);
                 None
             }

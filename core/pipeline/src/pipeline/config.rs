@@ -2,12 +2,14 @@
 
 pub(super) mod candidate;
 pub(crate) mod diagnose;
+mod effects;
+mod evaluate;
 pub(super) mod exports;
 mod route;
 mod schema;
 
 use runout_error::fault::{Fault, known_names};
-use runout_evaluate::{Evaluate, EvaluateConfig};
+use runout_evaluate::Evaluate;
 use std::path::{Path, PathBuf};
 
 use toml::de::DeValue;
@@ -18,12 +20,13 @@ pub use schema::{PlainTable, choice, pipeline_schema, plain_tables};
 
 use super::{
     document::{self, ConfigError, Document, Sources, Table, checked, required, table, tables},
-    registry::{Context, Registry},
+    registry::{Catalogue, Context, Registry},
     tables::FORM_HARMONICS,
 };
 use crate::{
+    effects::EffectCatalogue,
     report_head::ReportHead,
-    stage::{Check, Exporter, Loader, PointSeparator, Request, SourceKind},
+    stage::{Check, Evaluator, Exporter, Loader, Request, SourceKind},
     summary::{Limit, Summary},
 };
 use diagnose::{Diagnose, DiagnoseConfig};
@@ -64,6 +67,10 @@ pub struct Pipeline {
     pub surface: SurfaceConfig,
     /// Which of the standards' values are computed, and their limits.
     pub evaluate: Evaluate,
+    /// What computes values besides, in the order configured.
+    pub evaluators: Vec<Box<dyn Evaluator>>,
+    /// What models may lack: the registered effects and the pipeline's own.
+    pub effects: EffectCatalogue,
     /// In the order configured.
     pub exporters: Vec<Box<dyn Exporter>>,
     /// The same for the results of a diagnosis: below `diagnosed/`, or where `[diagnose] out` says.
@@ -83,7 +90,7 @@ pub struct Pipeline {
     pub(super) in_data_set: bool,
 }
 
-const KEYS: [&str; 13] = [
+const KEYS: [&str; 15] = [
     "title",
     "report",
     "rig",
@@ -93,7 +100,9 @@ const KEYS: [&str; 13] = [
     "compare",
     "surface",
     "evaluate",
+    "evaluator",
     "limit",
+    "effect",
     "diagnose",
     "export",
     "check",
@@ -153,13 +162,14 @@ impl Pipeline {
         for table in tables(root, "preprocess")? {
             preprocessors.push((registry.preprocessors.build(&table, &context)?, table));
         }
+        let effects = effects::effects(root, registry, &context, loader.kind())?;
         let (route, assessment) = match loader.kind() {
             SourceKind::Turns => {
                 if rig.is_none() {
                     return Err(Fault::here("missing key `rig`").help("describe sensors and setups in [rig]"));
                 }
                 let separator = registry.separators.build(&separate_table, &context)?;
-                route::turns(preprocessors, separator, &separate_table, root, registry)?
+                route::turns(preprocessors, separator, &separate_table, root, &effects)?
             }
             SourceKind::Points => {
                 if let Some((_, table)) = preprocessors.first() {
@@ -187,12 +197,11 @@ impl Pipeline {
             let whole = if shared { candidate::with_shared_keys(&table, &separate_table, registry) } else { table };
             compare.push(candidate::candidate(&whole, registry, &context)?);
         }
-        let checks = tables(root, "check")?
-            .iter()
-            .map(|table| registry.checks.build(table, &context))
-            .collect::<Result<_, _>>()?;
-        let evaluate = evaluate(root, &route, rig.as_ref(), assessment.as_ref())?;
-        let of_result = with_limits(route.tables(assessment.as_ref(), rig.as_ref()), evaluate.limits());
+        let checks = built(root, "check", &registry.checks, &context)?;
+        let evaluators = built(root, "evaluator", &registry.evaluators, &context)?;
+        let evaluate = evaluate::evaluate(root, &route, rig.as_ref(), assessment.as_ref(), &evaluators)?;
+        let of_result = route.tables(assessment.as_ref(), rig.as_ref(), !evaluators.is_empty());
+        let of_result = with_limits(of_result, evaluate.limits());
         let exporting = Exporting {
             registry,
             context: &context,
@@ -214,6 +223,8 @@ impl Pipeline {
             diagnose,
             surface,
             evaluate,
+            evaluators,
+            effects,
             exporters,
             diagnosed,
             checks,
@@ -279,8 +290,13 @@ impl Pipeline {
     }
 }
 
+/// The stages of a kind of which there may be several.
+fn built<S>(root: &Table, key: &str, catalogue: &Catalogue<S>, context: &Context) -> Result<Vec<S>, Fault> {
+    tables(root, key)?.iter().map(|table| catalogue.build(table, context)).collect()
+}
+
 /// Tables whose texts may name files that a run reads besides those of `[load]`.
-const READERS: [&str; 3] = ["preprocess", "separate", "evaluate"];
+const READERS: [&str; 5] = ["preprocess", "separate", "evaluate", "evaluator", "effect"];
 
 /// The files that texts of a configuration name, each once.
 fn named_files(root: &Table, folder: &Path) -> Vec<PathBuf> {
@@ -327,54 +343,4 @@ fn title(root: &Table) -> Result<String, Fault> {
         Some(title) => Ok(title.to_owned()),
         None => Err(Fault::span(value.span(), "expected the title in quotes")),
     }
-}
-
-/// What is evaluated of a result, and the limits of it.
-fn evaluate(
-    root: &Table,
-    route: &Route,
-    rig: Option<&Rig>,
-    assessment: Option<&Assessment>,
-) -> Result<Evaluate, Fault> {
-    let configured = table(root, "evaluate")?;
-    let limits = tables(root, "limit")?;
-    let given = route.evaluables();
-    let own = route.point_separator().map(PointSeparator::symbols).unwrap_or_default();
-    let limited = limits.first().filter(|_| own.is_empty());
-    if let (true, Some(table)) = (given.is_empty(), configured.as_ref().or(limited)) {
-        let fault = Fault::span(
-            table.span(),
-            "there is no form here, nor another profile, height map or motion of an axis, whose values could be chosen or limited",
-        );
-        return Err(fault.help("leave it out; the values are those of the separator"));
-    }
-    let measures = rig.filter(|_| matches!(route, Route::Turns { .. }));
-    let mut lists_values = false;
-    let check = |config: EvaluateConfig| {
-        lists_values = config.values.is_some();
-        // Sections of measured points are those of their files.
-        measures.map_or(Ok(()), |rig| config.check_datum(rig))?;
-        config.check_given(&given)?;
-        config.check()
-    };
-    let configured = configured.map(|table| checked::<EvaluateConfig, _>(&table, check)).transpose()?;
-    let mut evaluate = configured.unwrap_or_default();
-    if !lists_values && route.point_separator().is_some_and(PointSeparator::is_for_areal_values) {
-        evaluate.add_areal();
-    }
-    if !lists_values && assessment.is_some_and(Assessment::has_no_observable_form) {
-        evaluate.add_run_out();
-    }
-    evaluate.keep_given(&given);
-    if let Some(rig) = measures {
-        evaluate.add_faces(rig);
-    }
-    for table in limits {
-        let limit = checked::<Limit, _>(&table, |limit| {
-            limit.orders.into_iter().for_each(|orders| evaluate.add_amplitudes(orders));
-            limit.check(&evaluate, &own, rig)
-        })?;
-        evaluate.add_limit(limit);
-    }
-    Ok(evaluate)
 }

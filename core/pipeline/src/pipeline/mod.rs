@@ -5,6 +5,7 @@ pub mod compare;
 mod config;
 pub mod diagnose;
 pub mod document;
+mod evaluations;
 mod hidden_readings;
 mod observer;
 mod ordered_collector;

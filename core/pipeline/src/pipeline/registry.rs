@@ -10,8 +10,8 @@ use toml::{Spanned, de::DeTable};
 
 use super::document::{self, Table, inline};
 use crate::{
-    effects::EffectCatalogue,
-    stage::{Check, Exporter, Loader, Preprocessor, Separator, Simulator},
+    effects::{EffectCatalogue, EffectEntry},
+    stage::{Check, Evaluator, Exporter, Loader, Preprocessor, Separator, Simulator},
 };
 use runout_turning::rig::Rig;
 
@@ -25,6 +25,8 @@ pub struct Registry {
     pub preprocessors: Catalogue<Preprocessor>,
     /// From profiles or points to form and motion.
     pub separators: Catalogue<Separator>,
+    /// From the tables of a result to values.
+    pub evaluators: Catalogue<Box<dyn Evaluator>>,
     /// From results to files.
     pub exporters: Catalogue<Box<dyn Exporter>>,
     /// From scenarios to recordings.
@@ -33,6 +35,8 @@ pub struct Registry {
     pub checks: Catalogue<Box<dyn Check>>,
     /// What models may lack.
     pub effects: EffectCatalogue,
+    /// What makes effects of a pipeline's own, which its models may lack too.
+    pub own_effects: Catalogue<EffectEntry>,
 }
 
 /// The plugins of one stage.

@@ -7,13 +7,14 @@ use super::{
         Pipeline,
         exports::{summary_path, written},
     },
+    evaluations::Evaluations,
     station_summary::summarise,
     tables::{StationTables, consistency_rows, correction_rows, named_value_rows},
     warnings::{Warnings, findings, of_checks, of_stations},
 };
 use crate::{
     atomic_file::{FolderLock, PendingFile, commit_all, commit_last_after_others},
-    stage::{About, Completed, Export, Exporter, PointSeparator, ResultInfo, Takes},
+    stage::{About, Completed, Export, Exporter, OwnValues, PointSeparator, ResultInfo, Takes},
     summary::{LostOrders, PartSummary, Summary, SurfaceSummary, Value},
 };
 use runout_closed_loop::{correction::Correction, diagnosis, diagnosis::Diagnosis};
@@ -43,7 +44,8 @@ enum SurfaceUse {
 #[allow(clippy::struct_excessive_bools, reason = "facts of a pipeline, each of which is asked for by itself")]
 pub(super) struct ResultWriter {
     exports: Vec<Box<dyn Export>>,
-    /// Whether an exporter takes tables.
+    evaluations: Evaluations,
+    /// Whether an exporter or an evaluator takes tables.
     tables_wanted: bool,
     specs: Vec<TableSpec>,
     station_tables: StationTables,
@@ -90,6 +92,7 @@ impl ResultWriter {
         let files = outputs.iter().map(PathBuf::as_path);
         let lock = if pipeline.in_data_set { FolderLock::covering(files) } else { FolderLock::of(files) }?;
         let exports: Result<Vec<_>> = exporters.iter().map(|exporter| exporter.begin(&info)).collect();
+        let evaluations = Evaluations::begin(&pipeline.evaluators, &info)?;
         let tested = pipeline.route.point_separator().is_some_and(PointSeparator::needs_surface);
         let takes = |takes: Takes| exporters.iter().any(|exporter| exporter.takes() == takes);
         let evaluate = pipeline.evaluate.clone();
@@ -102,7 +105,8 @@ impl ResultWriter {
         let gathered = surface != SurfaceUse::Unused || evaluate.has(Group::Cylindricity);
         Ok(Self {
             exports: exports?,
-            tables_wanted: takes(Takes::Tables) || takes(Takes::TablesAndSurface),
+            tables_wanted: takes(Takes::Tables) || takes(Takes::TablesAndSurface) || !evaluations.is_empty(),
+            evaluations,
             specs: pipeline.tables.clone(),
             station_tables: StationTables::new(pipeline.assessment.as_ref(), pipeline.rig.as_ref())
                 .of_stations(stations.len()),
@@ -151,8 +155,27 @@ impl ResultWriter {
             for export in &mut self.exports {
                 export.rows(spec, rows)?;
             }
+            self.evaluations.rows(spec, rows)?;
         }
         Ok(())
+    }
+
+    /// Takes the values of the evaluators, and gives what they remark.
+    fn evaluate(&mut self) -> Result<Vec<String>> {
+        let known = if self.evaluations.is_empty() { Vec::new() } else { self.value_rows()? };
+        let OwnValues { values, remarks } = self.evaluations.finish(&self.specs, &known, &self.summary)?;
+        self.summary.values.extend(values);
+        Ok(remarks)
+    }
+
+    /// Rows of the tables of values.
+    fn value_rows(&self) -> Result<Vec<TableRows>> {
+        if !self.of_form {
+            return Ok(vec![named_value_rows(&self.summary.values, false)?]);
+        }
+        let named = !self.summary.values.is_empty();
+        let named = named.then(|| named_value_rows(&self.summary.values, true)).transpose()?;
+        Ok(std::iter::once(self.station_tables.value_rows(&self.summary)?).chain(named).collect())
     }
 
     /// Takes a domain's own values, those of the standards of what it offers beside form, and the convention of its tables.
@@ -251,18 +274,12 @@ impl ResultWriter {
             self.summary.provenance.inputs.push(Input::of(file)?);
         }
         self.summary.refute_part();
+        let of_evaluators = self.evaluate()?;
         let (limits, unmatched) = values::decide(self.evaluate.limits(), &self.summary.all_values())?;
         self.summary.limits = limits;
-        self.gather_warnings(remarks.into_iter().chain(unmatched));
-        let values = if self.of_form {
-            self.station_tables.value_rows(&self.summary)?
-        } else {
-            named_value_rows(&self.summary.values, false)?
-        };
-        let named = self.of_form && !self.summary.values.is_empty();
-        let named = named.then(|| named_value_rows(&self.summary.values, true)).transpose()?;
+        self.gather_warnings(remarks.into_iter().chain(of_evaluators).chain(unmatched));
         let last: Vec<TableRows> =
-            std::iter::once(values).chain(named).chain(correction_rows(&self.summary.effects)?).collect();
+            self.value_rows()?.into_iter().chain(correction_rows(&self.summary.effects)?).collect();
         self.write(&last)?;
         self.write(consistency_rows(&self.summary.consistency)?.as_slice())?;
         let about = if self.of_form {

@@ -1,6 +1,7 @@
 //! The stages of a pipeline: one trait a file. A plugin implements one of them.
 
 mod check;
+mod evaluator;
 mod exporter;
 mod loader;
 mod overview;
@@ -11,6 +12,7 @@ mod separator;
 mod simulator;
 
 pub use check::{Check, Planned, captures_sampled, speeds_of};
+pub use evaluator::{Evaluation, Evaluator, OwnValues};
 pub use exporter::{About, Completed, Export, Exporter, ResultInfo, Takes};
 pub use loader::{Loader, Request, Source, SourceKind};
 pub use overview::{Overview, Part, Section};

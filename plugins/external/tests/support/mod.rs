@@ -14,7 +14,7 @@ use runout_core::{
     rig::RigConfig,
     stage::{Loader, Request, Source, SourceKind},
 };
-use runout_spindle::simulate::{SpindleConfig, SpindleSimulator, simulator};
+use runout_spindle::simulate::{Effect, SpindleConfig, SpindleSimulator, simulator};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -23,6 +23,8 @@ use serde::Deserialize;
 struct Simulated {
     seed: u64,
     rig: RigConfig,
+    #[serde(default)]
+    effect: Vec<Effect>,
 }
 
 struct SimulatedRecording(&'static SpindleSimulator);
@@ -56,6 +58,7 @@ impl StageConfig for Simulated {
         config.motion.y_rms_um = 1.5;
         config.eccentricity.offset_um = 4.0;
         config.noise.rms_um = 0.05;
+        config.effect = self.effect;
         Ok(Box::new(SimulatedRecording(Box::leak(Box::new(simulator(&config)?)))))
     }
 }

@@ -79,6 +79,12 @@ impl Shared {
         &*self.kinds[self.places[place].kind]
     }
 
+    /// # Errors
+    /// When one of the effects cannot say what it does.
+    pub(crate) fn check_effects(&self) -> Result<()> {
+        self.kinds.iter().find_map(|kind| kind.failure()).map_or(Ok(()), Err)
+    }
+
     /// What the user should know of the data.
     pub(crate) fn warnings(&self) -> Vec<String> {
         let mut warnings = Vec::new();

@@ -55,6 +55,7 @@ impl SpindleFit {
             return Err(Error::new("apply", "effects", "no solution settles at their values").of(ErrorKind::Numerical));
         }
         let remainder = remainder(&shared, &stations, &layout, &alterations);
+        shared.check_effects()?;
         Ok(Self { shared, alterations, layout, stations, remainder, others: Vec::new(), weights: vec![1.0] })
     }
 

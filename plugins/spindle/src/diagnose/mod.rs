@@ -100,6 +100,14 @@ impl SpindleModel {
         Ok(Self { traced: Arc::new(traced), whole: Some(Box::new(whole)) })
     }
 
+    /// Whether all effects could say what they do.
+    ///
+    /// # Errors
+    /// When one of them failed.
+    pub(crate) fn check_effects(&self) -> Result<()> {
+        self.traced.check_effects()
+    }
+
     /// Mistakes in the rig file that leave no trace in these data, and what they do to form or motion, in µm rms.
     ///
     /// # Errors
@@ -310,6 +318,7 @@ fn run(model: &SpindleModel, stations: &[Station], settings: &Settings) -> Resul
     let shown = model.traced.places.iter().filter(|place| of_turns(model, place) && !not_shown(place));
     let max_added = settings.max_added + shown.count();
     let closed = closed_loop::diagnose(model, &Settings { left_out, max_added, ..settings.clone() })?;
+    model.check_effects()?;
     let mut diagnosis = closed.diagnosis;
     said::say_drifts(&mut diagnosis, &model.traced);
     said::say_lines(&mut diagnosis, &model.traced, stations);

@@ -6,10 +6,11 @@
 //! which a rig or a scenario is written: angles in degrees, places in mm.
 //!
 //! To add one: a type that implements [`SpindleEffect`], here and in [`all`], or in a crate of its own whose `register` adds it
-//! by [`entry`] (`examples/13-own-effect`). `tests/diagnose.rs` checks every effect's partials against finite differences.
+//! by [`entry`] (`examples/13-own-effect`); one of a single channel may be no more than a [`ChannelTransfer`]. `tests/diagnose.rs` checks every effect's partials against finite differences.
 
 mod asynchronous_line;
 mod axial_motion;
+mod channel_effect;
 mod channel_response;
 mod correct;
 mod cross_talk;
@@ -33,13 +34,14 @@ mod unlike_shares;
 use std::sync::Arc;
 
 use runout_core::{
-    Complex64,
+    Complex64, Error,
     effects::EffectEntry,
     model::{Parameter, diagnosis::Estimated, in_tolerances},
     rig::Rig,
 };
 
 pub use crate::alterations::{Alterations, Harmonic, Pattern, PatternOf, SensorAlteration, SetupAlteration, Transfer};
+pub use channel_effect::{ChannelEffect, ChannelTransfer, differences};
 pub use correct::creep;
 use mistakes::ordered_pairs;
 pub use mistakes::{Mistake, pair_of, pairs};
@@ -131,6 +133,11 @@ pub trait SpindleEffect: Send + Sync {
             TurnEvidence::Line(number) => Some(number),
             TurnEvidence::Levels => None,
         }
+    }
+
+    /// Why it cannot say what it does, once that has failed: the work that uses it then fails with this error.
+    fn failure(&self) -> Option<Error> {
+        None
     }
 
     /// Its parameters as people say them.

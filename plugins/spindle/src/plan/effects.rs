@@ -71,7 +71,9 @@ pub fn foresee(
     let model = |kinds| {
         SpindleModel::new(selection.clone(), layout.clone(), second_order, kinds, std::slice::from_ref(&station))
     };
-    let mut foresight = Foresight { assuming: nominal::words(), ..foresight::foresee(&model(kinds)?)? };
+    let foreseen = model(kinds)?;
+    let mut foresight = Foresight { assuming: nominal::words(), ..foresight::foresee(&foreseen)? };
+    foreseen.check_effects()?;
     let traceless = model(mistakes)?.traceless_mistakes()?;
     foresight
         .blind_to

@@ -1,9 +1,9 @@
 //! The ways from a measurement to form, built from their stages.
 
 use crate::{
+    effects::EffectCatalogue,
     pipeline::{
         document::{self, Table, table},
-        registry::Registry,
         tables::{self, StationTables},
     },
     points::PointColumn,
@@ -97,8 +97,13 @@ impl Route {
         model.is_some_and(PointModel::points_name_targets)
     }
 
-    /// The tables of its result.
-    pub(super) fn tables(&self, assessment: Option<&Assessment>, rig: Option<&Rig>) -> Vec<TableSpec> {
+    /// The tables of its result; with `evaluators` there are values of their own.
+    pub(super) fn tables(
+        &self,
+        assessment: Option<&Assessment>,
+        rig: Option<&Rig>,
+        evaluators: bool,
+    ) -> Vec<TableSpec> {
         let mut tables = Vec::new();
         if self.gives_form() {
             tables.extend(StationTables::new(assessment, rig).specs());
@@ -106,9 +111,9 @@ impl Route {
         tables.extend(self.point_separator().into_iter().flat_map(PointSeparator::tables));
         let own = tables::named_values(self.gives_form());
         match self {
-            Self::Turns { .. } => {}
-            Self::Points { .. } if self.gives_form() => tables.push(own.optional()),
-            Self::Points { .. } => tables.push(own),
+            Self::Turns { .. } if !evaluators => {}
+            _ if self.gives_form() => tables.push(own.optional()),
+            _ => tables.push(own),
         }
         tables.extend([tables::corrections(), tables::consistency()]);
         tables
@@ -137,7 +142,7 @@ pub(super) fn turns(
     separator: Separator,
     separate_table: &Table,
     root: &Table,
-    registry: &Registry,
+    effects: &EffectCatalogue,
 ) -> Result<(Route, Option<Assessment>), Fault> {
     let mut conditioners = Vec::new();
     let mut averager = None;
@@ -162,7 +167,7 @@ pub(super) fn turns(
             if assessment.has_no_observable_form() {
                 assessment.notes.insert(0, NOTHING_SEPARATED.into());
             }
-            let model = separator.model(&registry.effects);
+            let model = separator.model(effects);
             Ok((Route::Turns { conditioners, averager, separator, model }, Some(assessment)))
         }
         Separator::Points(_) => {
