@@ -12,7 +12,7 @@ use kuva::{
 };
 use runout_core::{
     Error, Result,
-    model::closed_loop::Settings,
+    closed_loop::Settings,
     pipeline::{
         INCLUDE_KEY, Pipeline, Registry,
         document::{ConfigError, Sources},

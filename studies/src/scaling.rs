@@ -2,7 +2,7 @@
 
 use std::{fmt::Write, time::Instant};
 
-use runout_core::{Error, Result, model::closed_loop::Settings, stage::Station};
+use runout_core::{Error, Result, closed_loop::Settings, stage::Station};
 use runout_spindle::{
     diagnose::diagnose,
     effects,

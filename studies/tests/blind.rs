@@ -1,6 +1,6 @@
 //! The short version of `runout-studies blind`.
 
-use runout_core::model::diagnosis::Verdict;
+use runout_core::closed_loop::diagnosis::Verdict;
 use runout_studies::blind::{self, draw::Kind};
 
 #[test]

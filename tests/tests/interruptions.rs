@@ -5,9 +5,9 @@
 use std::{num::NonZeroUsize, path::Path};
 
 use runout_core::{
+    closed_loop::diagnosis::Verdict,
     evaluate::Value,
     measurement::Recording,
-    model::diagnosis::Verdict,
     pipeline::{
         INCLUDE_KEY, Pipeline, Registry,
         diagnose::diagnose,

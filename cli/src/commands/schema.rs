@@ -4,7 +4,7 @@ use std::path::Path;
 
 use runout_core::{
     Error, atomic_file,
-    model::diagnosis::Diagnosis,
+    closed_loop::diagnosis::Diagnosis,
     pipeline::{Registry, batch::BatchReport, choice, compare::Comparison, pipeline_schema},
     rig::RigConfig,
     summary::Summary,

@@ -2,8 +2,8 @@
 
 use runout_core::{
     answer::Answer,
+    closed_loop::diagnosis::{Added, Blind, Diagnosis, Estimated, Level, Step},
     evaluate::ValueId,
-    model::diagnosis::{Added, Blind, Diagnosis, Estimated, Level, Step},
     summary::Summary,
 };
 

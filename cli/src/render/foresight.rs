@@ -1,6 +1,6 @@
 //! Which effects a rig would show, for people.
 
-use runout_core::model::{
+use runout_core::closed_loop::{
     diagnosis::BiasPerUnit,
     foresight::{Foresight, Visible, VisibleFrom},
 };
@@ -122,7 +122,7 @@ fn sizes(values: impl Iterator<Item = f64>, unit: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use runout_core::model::foresight::{Foresight, Visible};
+    use runout_core::closed_loop::foresight::{Foresight, Visible};
 
     use super::{Page, names, visible};
 

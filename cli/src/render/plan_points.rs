@@ -1,7 +1,7 @@
 //! A plan of measured points, for people.
 
 use runout_core::{
-    model::foresight::{Foresight, Visible},
+    closed_loop::foresight::{Foresight, Visible},
     stage::{LayoutScore, NoiseGain, PointPlan},
 };
 

@@ -2,7 +2,7 @@
 
 use runout_core::{
     azimuth::Azimuth,
-    model::{diagnosis, foresight::Foresight},
+    closed_loop::{diagnosis, foresight::Foresight},
     points::PointColumn,
     rig::{Rig, Rotation},
     separation::{Assessment, OrderAssessment, Quantity},

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use runout_core::{model::foresight::Foresight, rig::Rig, stage::PointPlan};
+use runout_core::{closed_loop::foresight::Foresight, rig::Rig, stage::PointPlan};
 use runout_spindle::plan::{self, Addition, Change, Optimum, Suggestion};
 use schemars::JsonSchema;
 use serde::Serialize;

@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 
 use super::{
     Fit, Model, Remainder, Setting,
-    closed_loop::Tracing,
     evidence::Evidence,
     fit::{Refit, first_step, refit},
     judgement::independent,
+    search::Tracing,
 };
 use runout_numerics::least_squares::dot;
 

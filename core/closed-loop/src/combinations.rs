@@ -2,10 +2,10 @@
 
 use super::{
     Fit, Model,
-    closed_loop::{SAME, Tracing},
     confounded::choices,
     fit::Refit,
     judgement::{same_finding, unit},
+    search::{SAME, Tracing},
 };
 
 impl<M: Model> Tracing<'_, M> {

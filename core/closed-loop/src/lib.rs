@@ -1,13 +1,12 @@
 //! The closed loop: what a declared model leaves of the data, traced to what it lacks.
 //!
 //! A [`Model`] fits everything that it declares and says what is left; it knows *effects* that it could have besides, each
-//! with parameters and a signature, the derivative of what is left by each parameter. [`closed_loop::diagnose`] finds which
+//! with parameters and a signature, the derivative of what is left by each parameter. [`diagnose`] finds which
 //! of them the data ask for, adds them, and says what it cannot know. Nothing here knows what is measured.
 //!
 //! ```
 //! use runout_closed_loop::{
-//!     Effect, Parameter,
-//!     closed_loop::{Settings, diagnose},
+//!     Effect, Parameter, Settings, diagnose,
 //!     diagnosis::Verdict,
 //!     linear_terms::{Declared, LinearTerms, Observations, Term},
 //! };
@@ -36,7 +35,6 @@
 //! ```
 
 mod candidates;
-pub mod closed_loop;
 mod combinations;
 mod confounded;
 pub mod correction;
@@ -51,10 +49,13 @@ pub mod linear_terms;
 mod mistakes;
 mod parts;
 mod report;
+mod search;
 mod taken_back;
 pub mod tested;
 
 use std::sync::Arc;
+
+pub use search::{Closed, Settings, diagnose};
 
 use self::diagnosis::{Estimated, Unexplained};
 use runout_consistency::{Check, Partition, Structure};

@@ -2,11 +2,11 @@
 
 use super::{
     Fit, Model, Remainder, Setting,
-    closed_loop::Tracing,
     evidence::Evidence,
     fit::Refit,
     found::{Declaration, Found},
     judgement::{same_finding, worse},
+    search::Tracing,
 };
 use runout_error::Result;
 

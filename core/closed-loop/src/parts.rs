@@ -1,6 +1,6 @@
 //! Effects of the whole that differ from part to part: the same everywhere, or each part its own, as the data say.
 
-use super::{Model, Setting, closed_loop::Tracing, fit::Refit, found::Found};
+use super::{Model, Setting, fit::Refit, found::Found, search::Tracing};
 
 /// A part's own effect is there where a parameter is this many standard deviations long.
 const SIGNIFICANT: f64 = 4.0;

@@ -2,10 +2,10 @@
 
 use super::{
     Fit, Model, Remainder,
-    closed_loop::Tracing,
     fit::{Refit, refit},
     found::Found,
     judgement::{BIC_LIMIT, P_LIMIT, excess, may_leave, unit},
+    search::Tracing,
 };
 
 /// A parameter this many standard uncertainties from 0 is needed: no refit without it is tried.

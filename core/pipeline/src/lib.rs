@@ -29,7 +29,7 @@ pub mod report_head;
 pub mod stage;
 pub mod summary;
 
-pub use runout_closed_loop as model;
+pub use runout_closed_loop as closed_loop;
 pub use runout_consistency as consistency;
 pub use runout_draws as draws;
 pub use runout_error::{Error, ErrorKind, Result, fault};

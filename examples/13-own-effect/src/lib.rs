@@ -61,9 +61,9 @@ mod tests {
     use std::path::Path;
 
     use runout_core::{
+        closed_loop::{Effect, Fit, Model, Setting, Settings, diagnosis::Verdict},
         inspection::Inspection,
         measurement::Recording,
-        model::{Effect, Fit, Model, Setting, closed_loop::Settings, diagnosis::Verdict},
         pipeline::{Context, StageConfig},
         rig::{Rig, RigConfig, Rotation, SensorConfig, SetupConfig},
         stage::{AverageRequest, Preprocessor, Station},

@@ -9,7 +9,7 @@ use hdf5_metno::{
 use runout_core::{
     Complex64,
     atomic_file::commit_all,
-    model::correction::Correction,
+    closed_loop::correction::Correction,
     pipeline::{Context, StageConfig, run::StationTables},
     provenance::{Input, Provenance},
     separation::{Quantity, Residual, SectionAt, Separation},

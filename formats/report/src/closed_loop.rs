@@ -2,7 +2,7 @@
 
 use maud::{Markup, html};
 use runout_core::{
-    model::diagnosis::{Added, Diagnosis, Estimated, Level, Moved, Unexplained},
+    closed_loop::diagnosis::{Added, Diagnosis, Estimated, Level, Moved, Unexplained},
     numerics::number::{significant, with_std},
 };
 

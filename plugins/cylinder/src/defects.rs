@@ -1,7 +1,7 @@
 //! Local defects of a circle: arcs of neighbouring points far from all others, as an edge, a chip or dirt leaves them. No effect of the
 //! cylinder explains them, and one of them bends all others: the closed loop sets them aside, and says where.
 
-use runout_core::model::diagnosis::Unexplained;
+use runout_core::closed_loop::diagnosis::Unexplained;
 
 use crate::{circle::Cleaned, robust::rms, scan::Scan};
 

@@ -11,7 +11,7 @@ use std::f64::consts::TAU;
 
 use runout_core::{
     Complex64, Result,
-    model::{
+    closed_loop::{
         Effect, Fit, Parameter,
         diagnosis::Unexplained,
         linear_terms::{Declared, HeldOut, LinearFit, LinearTerms, Observations, Term},

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use crate::simulator::{Part, Recording};
 use nalgebra::{DMatrix, DVector};
 use runout_core::{
-    model::{closed_loop, diagnosis::Diagnosis},
+    closed_loop::{self, diagnosis::Diagnosis},
     pipeline::{
         Pipeline, Registry,
         diagnose::diagnose,

@@ -6,7 +6,7 @@ use std::{f64::consts::TAU, path::PathBuf};
 
 use crate::simulator::{Part, Recording, around};
 use runout_core::{
-    model::diagnosis::Diagnosis,
+    closed_loop::diagnosis::Diagnosis,
     pipeline::{
         Pipeline, Registry,
         diagnose::diagnose,

@@ -4,9 +4,9 @@ use std::sync::OnceLock;
 
 use runout_core::{
     Complex64, Error, Result,
+    closed_loop::Parameter,
     effects::EffectEntry,
     fault::Fault,
-    model::Parameter,
     pipeline::{Context, StageConfig},
     table::{ColumnSpec, TableSpec, counts},
 };

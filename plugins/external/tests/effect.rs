@@ -57,7 +57,7 @@ fn diagnosed(
     script: &str,
     effects: &str,
     more: &str,
-) -> Result<runout_core::model::diagnosis::Diagnosis> {
+) -> Result<runout_core::closed_loop::diagnosis::Diagnosis> {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("own.py"), script).unwrap();
     let began = Instant::now();

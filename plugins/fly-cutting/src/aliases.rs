@@ -3,7 +3,7 @@
 //! They are equal at y = 0. Along y their phases differ by the whole number times θ. Which of them explain the map is decided by refits,
 //! as for any confounded set.
 
-use runout_core::model::{Fit, Model, Setting, closed_loop::Closed, fit::refit};
+use runout_core::closed_loop::{Closed, Fit, Model, Setting, fit::refit};
 
 use crate::{
     effects::{MISSING, SPINDLE_LINE},

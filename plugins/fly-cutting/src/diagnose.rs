@@ -2,9 +2,8 @@
 
 use runout_core::{
     Error, Result,
-    model::{
-        Effect, Fit as _, Model,
-        closed_loop::{self, Closed, Settings},
+    closed_loop::{
+        self, Closed, Effect, Fit as _, Model, Settings,
         diagnosis::{Diagnosis, Estimated, Moved, Unexplained, Verdict},
     },
     points::Points,
@@ -112,7 +111,7 @@ impl FlyCutting {
 fn refresh(model: &CutModel, closed: &mut Closed<CutFit>, settings: &Settings) {
     for setting in &closed.settings[settings.known.len()..] {
         let effect = MISSING[setting.effect].effect();
-        let is = |added: &&mut runout_core::model::diagnosis::Added| {
+        let is = |added: &&mut runout_core::closed_loop::diagnosis::Added| {
             added.effect == effect.id && added.targets == effect.targets
         };
         let Some(added) = closed.diagnosis.added.iter_mut().find(is) else { continue };

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use runout_core::{
     Complex64,
-    model::{Effect, Parameter, Setting},
+    closed_loop::{Effect, Parameter, Setting},
 };
 
 use crate::{

@@ -2,7 +2,7 @@
 //! describes its arc, are in the map as the declaration has them, or in the map as it would be without the mistake.
 
 use runout_core::{
-    model::{Fit, Model},
+    closed_loop::{Fit, Model},
     points::{Points, mistakes},
 };
 

@@ -6,13 +6,13 @@ use std::sync::{Arc, OnceLock};
 
 use runout_core::{
     Error, Result,
-    consistency::{Check, Partition, Test, keys::among_family},
-    model::{
+    closed_loop::{
         Bias, Effect, Fit, Model, Outcome, Remainder, Setting,
         diagnosis::{Estimated, Unexplained},
         fit::refit,
         tested::Tested,
     },
+    consistency::{Check, Partition, Test, keys::among_family},
     numerics::least_squares::{Basis, dot},
 };
 
@@ -389,7 +389,7 @@ impl Fit for CutFit {
         let parameters = missing.effect().parameters;
         let columns =
             missing.partials(&vec![0.0; parameters.len()], &self.cut, &self.data.fitted, &self.phased.surface);
-        let of = |(parameter, column): (runout_core::model::Parameter, Vec<f64>)| Bias {
+        let of = |(parameter, column): (runout_core::closed_loop::Parameter, Vec<f64>)| Bias {
             on: "surface".into(),
             value: (dot(&column, &column) / column.len().max(1) as f64).sqrt(),
             unit: format!("nm/{}", parameter.unit),

@@ -2,9 +2,9 @@
 
 use runout_core::{
     Result,
+    closed_loop::{Fit, Model, Setting},
     fault::Fault,
     height_grid::GridPlaces,
-    model::{Fit, Model, Setting},
     numerics::{least_squares::dot, number::significant},
     pipeline::{Context, StageConfig},
     points::{PointColumn, PointKind::Number, Points},

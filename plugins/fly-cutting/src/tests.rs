@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
-use runout_core::{model::Setting, points::Points};
+use runout_core::{closed_loop::Setting, points::Points};
 
 use crate::{
     config::FlyCuttingConfig,

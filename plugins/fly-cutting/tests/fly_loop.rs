@@ -4,7 +4,7 @@
 
 use crate::common;
 use crate::common::{CUT, diagnose, listing, parameter, run, scenario, separator, value};
-use runout_core::{model::diagnosis::Verdict, points::Points};
+use runout_core::{closed_loop::diagnosis::Verdict, points::Points};
 
 const SIDE: usize = 160;
 
@@ -174,7 +174,7 @@ fn heights_in_another_unit_and_too_large_a_noise_are_never_explained() {
     in_um.std_nm = Some(0.1);
     let outcome = run(in_um.clone(), &separator(CUT));
     assert!(outcome.remarks.iter().any(|remark| remark.contains("Is `height_nm` in µm")), "{:?}", outcome.remarks);
-    let settings = runout_core::model::closed_loop::Settings::default();
+    let settings = runout_core::closed_loop::Settings::default();
     let fly = separator(CUT);
     let model = runout_core::stage::PointSeparator::model(&fly).unwrap();
     let error = model.diagnose(&Points::of_grid(in_um, "map.h5".into()), &settings).unwrap_err();

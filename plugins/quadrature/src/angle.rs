@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use runout_core::{
     Complex64, Result,
-    model::{Fit, linear_terms::LinearFit},
+    closed_loop::{Fit, linear_terms::LinearFit},
     points::Points,
     table::{ColumnSpec, TableRows, TableSpec, counts, numbers, numbers_or_null},
 };

@@ -23,7 +23,7 @@
 
 use runout_core::{
     Complex64,
-    model::{Effect, Parameter},
+    closed_loop::{Effect, Parameter},
 };
 
 /// A component that rotates m times as fast as the pair.

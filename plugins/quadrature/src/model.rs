@@ -8,12 +8,12 @@ use std::f64::consts::TAU;
 
 use runout_core::{
     Error, ErrorKind, Result,
-    consistency::{Kind, Structure},
-    fault::{Fault, within},
-    model::{
+    closed_loop::{
         Effect, Fit,
         linear_terms::{LinearFit, LinearTerms, Observations, Term},
     },
+    consistency::{Kind, Structure},
+    fault::{Fault, within},
     pipeline::{Context, StageConfig},
     points::{PointColumn, PointKind::Number, Points},
     stage::{LinearModel, Outcome, PointModel, PointSeparator, Separator, residual_table, separate_declared},

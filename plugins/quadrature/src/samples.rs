@@ -1,6 +1,6 @@
 //! Samples of a quadrature signal as the model takes them.
 
-use runout_core::{Complex64, Error, Result, model::linear_terms::Declared, points::Points};
+use runout_core::{Complex64, Error, Result, closed_loop::linear_terms::Declared, points::Points};
 
 use crate::{
     components::{Component, UNIT},

@@ -7,7 +7,7 @@
 use nalgebra::{Matrix2, Vector2};
 use runout_core::{
     Complex64, Error, ErrorKind, Result,
-    model::{
+    closed_loop::{
         Model,
         linear_terms::{Declared, LinearTerms, Observations},
     },

@@ -6,7 +6,7 @@ use crate::measured_data;
 use std::{f64::consts::TAU, fmt::Write, path::PathBuf};
 
 use runout_core::{
-    model::diagnosis::Diagnosis,
+    closed_loop::diagnosis::Diagnosis,
     pipeline::{
         Pipeline, Registry,
         diagnose::diagnose,

@@ -11,7 +11,7 @@ use std::{
 
 use arrow_array::{Array, cast::AsArray, types::Float64Type};
 use runout_core::{
-    model::{closed_loop, diagnosis::Diagnosis},
+    closed_loop::{self, diagnosis::Diagnosis},
     pipeline::{Pipeline, Registry, diagnose::diagnose, document::Sources, run::Silent},
     points::Points,
     stage::{LinearModel, PointSeparator},

@@ -1,7 +1,7 @@
 //! What effects that are not observable do to the results all the same.
 
 use nalgebra::Vector3;
-use runout_core::model::diagnosis::{BiasPerUnit, Blind};
+use runout_core::closed_loop::diagnosis::{BiasPerUnit, Blind};
 
 use crate::{
     campaign::Campaign,

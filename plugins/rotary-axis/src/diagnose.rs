@@ -7,13 +7,12 @@
 use nalgebra::Vector3;
 use runout_core::{
     Error, ErrorKind, Result,
-    consistency::Check,
-    model::{
-        Effect, Fit as _, Setting,
-        closed_loop::{self, Settings},
+    closed_loop::{
+        self, Effect, Fit as _, Setting, Settings,
         diagnosis::{Diagnosis, Estimated, Unexplained, Verdict},
         linear_terms::{Declared, LinearTerms, Observations, Term},
     },
+    consistency::Check,
     points::Points,
     stage::{Outcome, PointDiagnosis, PointModel, PointSeparator},
     summary::moved,

@@ -14,7 +14,7 @@
 //! | `nest-step` | x, y, z | S from a time on |
 
 use nalgebra::Vector3;
-use runout_core::model::{Effect, Parameter};
+use runout_core::closed_loop::{Effect, Parameter};
 
 use crate::{axis::Axis, campaign::Campaign, kinematics::turn, solve::Column};
 

@@ -10,11 +10,11 @@
 
 use runout_core::{
     Error, Result,
-    fault::{Fault, within},
-    model::{
+    closed_loop::{
         Effect, Fit, Parameter, Remainder,
         linear_terms::{Declared, LinearFit, LinearTerms, Observations, Term},
     },
+    fault::{Fault, within},
     pipeline::{Context, StageConfig},
     points::{PointColumn, PointKind::Number, Points},
     stage::{LinearModel, Outcome, PointModel, PointSeparator, Separator, residual_table, separate_declared},

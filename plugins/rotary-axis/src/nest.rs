@@ -6,7 +6,7 @@
 
 use nalgebra::Vector3;
 use runout_core::{
-    model::diagnosis::{BiasPerUnit, Blind, Diagnosis},
+    closed_loop::diagnosis::{BiasPerUnit, Blind, Diagnosis},
     numerics::least_squares::{SINGULAR, least_norm},
 };
 

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use nalgebra::Vector3;
 use runout_core::{
     Error, Result,
-    model::foresight::{Foresight, foresee},
+    closed_loop::foresight::{Foresight, foresee},
     points::Points,
     stage::{LayoutScore, NoiseGain, PointAddition, PointPlan, PointSeparator},
 };

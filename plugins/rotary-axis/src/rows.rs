@@ -1,6 +1,6 @@
 //! The rows that the closed loop works with, and the shapes (time constants, times of steps) that explain most of them.
 
-use runout_core::{model::Setting, numerics::least_squares::dot};
+use runout_core::{closed_loop::Setting, numerics::least_squares::dot};
 
 use crate::{
     effects::{CANDIDATES, Shapes},

@@ -6,7 +6,7 @@ use crate::common::{THREE_BALLS, scenario, separator, value};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use runout_core::{
-    model::{closed_loop::Settings, diagnosis::Verdict},
+    closed_loop::{Settings, diagnosis::Verdict},
     stage::PointSeparator,
 };
 
@@ -92,7 +92,7 @@ fn random_campaigns_are_diagnosed() {
         let points = scenario(&text).simulate().points();
         let found = separator.model().unwrap().diagnose(&points, &settings).unwrap();
         let diagnosis = &found.diagnosis;
-        let is = |added: &runout_core::model::diagnosis::Added| {
+        let is = |added: &runout_core::closed_loop::diagnosis::Added| {
             let own = added.targets.iter().fold(added.effect.clone(), |name, target| format!("{name} {target}"));
             let by_coordinate = ["thermal-drift", "nest-by-direction", "nest-step"].contains(&name);
             let wanted = if by_coordinate { format!("{name} {coordinate}") } else { name.to_owned() };

@@ -4,8 +4,8 @@
 
 use crate::common::{COMPONENTS, LOCATION, PLACEMENT, THREE_BALLS, scenario, separator, value};
 use runout_core::{
-    model::{
-        closed_loop::Settings,
+    closed_loop::{
+        Settings,
         diagnosis::{Added, Verdict},
     },
     stage::{PointDiagnosis, PointSeparator},
@@ -283,7 +283,7 @@ fn known_effects_are_taken_out() {
     let separator = separator(&format!("{THREE_BALLS}{CONFIG}"));
     let model = separator.model().unwrap();
     let effect = model.effects().iter().position(|effect| effect.targets == ["XZ"]).unwrap();
-    let known = vec![runout_core::model::Setting { effect, values: vec![100.0] }];
+    let known = vec![runout_core::closed_loop::Setting { effect, values: vec![100.0] }];
     let found = model.diagnose(&points, &Settings { known, ..Settings::default() }).unwrap();
     assert!(found.diagnosis.added.is_empty(), "{:?}", found.diagnosis.added);
     assert_eq!(found.diagnosis.verdict, Verdict::AtNoiseFloor);
@@ -291,7 +291,7 @@ fn known_effects_are_taken_out() {
     assert!((number - 34.6).abs() < 4.5 * std, "{number} {std}");
     // A step without its time is no step.
     let effect = model.effects().iter().position(|effect| effect.id == "nest-step").unwrap();
-    let known = vec![runout_core::model::Setting { effect, values: vec![6.0, 0.0] }];
+    let known = vec![runout_core::closed_loop::Setting { effect, values: vec![6.0, 0.0] }];
     let refused = model.diagnose(&points, &Settings { known, ..Settings::default() }).unwrap_err().to_string();
     assert!(refused.contains("`nest-step` has no time"), "{refused}");
 }

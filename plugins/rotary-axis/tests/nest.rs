@@ -4,7 +4,7 @@
 
 use crate::common::{COMPONENTS, LOCATION, PLACEMENT, THREE_BALLS, scenario, separator};
 use runout_core::{
-    model::{closed_loop::Settings, diagnosis::Verdict},
+    closed_loop::{Settings, diagnosis::Verdict},
     stage::{PointDiagnosis, PointSeparator},
 };
 

@@ -9,7 +9,7 @@ use std::{
 };
 
 use runout_core::{
-    model::diagnosis::{Diagnosis, Verdict},
+    closed_loop::diagnosis::{Diagnosis, Verdict},
     pipeline::{Pipeline, Registry, diagnose::diagnose, document::Sources, run::Silent},
 };
 

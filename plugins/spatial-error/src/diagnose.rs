@@ -4,12 +4,11 @@
 
 use runout_core::{
     Result,
-    consistency::Check,
-    model::{
-        Effect,
-        closed_loop::Settings,
+    closed_loop::{
+        Effect, Settings,
         diagnosis::{Added, BiasPerUnit, Blind, Diagnosis, Level, Refused, Step, Unexplained, Verdict},
     },
+    consistency::Check,
     points::Points,
     stage::{PointDiagnosis, PointModel},
     summary::moved,

@@ -1,6 +1,6 @@
 //! What the declared model may lack: errors of the axes, a drift and a step of the tracker; and jumps that no effect describes.
 
-use runout_core::model::{Effect, Parameter};
+use runout_core::closed_loop::{Effect, Parameter};
 
 use crate::{
     campaign::Campaign,

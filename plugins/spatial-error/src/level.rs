@@ -1,6 +1,6 @@
 //! How far a fit is from its readings, and what noise makes of that.
 
-use runout_core::model::diagnosis::Level;
+use runout_core::closed_loop::diagnosis::Level;
 
 use crate::{campaign::Campaign, noise::Noise, projections::Projections, residual::residual_um, solve::Solution};
 

@@ -2,7 +2,7 @@
 
 use runout_core::{
     Error, Result,
-    model::{Effect, closed_loop::Settings, diagnosis::Estimated},
+    closed_loop::{Effect, Settings, diagnosis::Estimated},
 };
 
 use crate::{

@@ -4,9 +4,8 @@
 
 use crate::support::{scenario, separator};
 use runout_core::{
-    model::{
-        Setting,
-        closed_loop::Settings,
+    closed_loop::{
+        Setting, Settings,
         diagnosis::{Diagnosis, Verdict},
     },
     stage::PointSeparator,

@@ -5,7 +5,7 @@
 use std::path::{Path, PathBuf};
 
 use runout_core::{
-    model::diagnosis::Verdict,
+    closed_loop::diagnosis::Verdict,
     pipeline::{Context, Pipeline, Registry, StageConfig, diagnose::diagnose, document::Sources, run::Silent},
     stage::Simulation,
 };

@@ -7,8 +7,8 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 use runout_core::{
+    closed_loop::{Settings, diagnosis::Verdict},
     consistency::Test,
-    model::{closed_loop::Settings, diagnosis::Verdict},
     points::Points,
     stage::{Outcome, PointSeparator},
 };

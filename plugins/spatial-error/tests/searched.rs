@@ -4,8 +4,8 @@
 
 use crate::support::{scenario, separator};
 use runout_core::{
-    model::{
-        closed_loop::Settings,
+    closed_loop::{
+        Settings,
         diagnosis::{Added, Diagnosis, Verdict},
     },
     stage::PointSeparator,

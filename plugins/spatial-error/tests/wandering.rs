@@ -6,8 +6,8 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 use runout_core::{
+    closed_loop::Settings,
     consistency::Test,
-    model::closed_loop::Settings,
     stage::{PointModel, PointSeparator},
 };
 use runout_spatial_error::simulate::{Scenario, Simulated};

@@ -5,8 +5,8 @@
 
 use runout_core::{
     Complex64,
+    closed_loop::foresight,
     consistency::{Check, Test},
-    model::foresight,
     rig::Rig,
 };
 

@@ -10,12 +10,11 @@ use crate::campaigns::{averaged, campaign};
 use crate::common::{Sum, profile, random_sum, value};
 use runout_core::{
     Complex64,
-    measurement::StationTruth,
-    model::{
-        Fit, Model, Setting,
-        closed_loop::Settings,
+    closed_loop::{
+        Fit, Model, Setting, Settings,
         diagnosis::{Diagnosis, Verdict},
     },
+    measurement::StationTruth,
     rig::{Looks, Rig, RigConfig, Rotation, SensorConfig, SetupConfig},
     separation::{Quantity, Separation},
     stage::{Station, StationSeparator},

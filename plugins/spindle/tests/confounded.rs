@@ -7,11 +7,11 @@
 use crate::campaigns::{averaged, campaign};
 use runout_core::{
     Complex64,
-    measurement::StationTruth,
-    model::{
-        closed_loop::Settings,
+    closed_loop::{
+        Settings,
         diagnosis::{Added, Verdict},
     },
+    measurement::StationTruth,
     numerics::fourier::Fourier,
     separation::{Quantity, Separation},
     stage::StationDiagnosis,

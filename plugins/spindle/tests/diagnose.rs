@@ -13,12 +13,11 @@ mod wiring;
 use crate::campaigns::{averaged, averaged_behind, campaign};
 use runout_core::{
     Complex64,
-    measurement::StationTruth,
-    model::{
-        Fit, Model, Setting,
-        closed_loop::Settings,
+    closed_loop::{
+        Fit, Model, Setting, Settings,
         diagnosis::{Added, Estimated, Verdict},
     },
+    measurement::StationTruth,
     numerics::fourier::Fourier,
     rig::SensorConfig,
     separation::{Quantity, Separation},

@@ -6,7 +6,7 @@
 use crate::campaigns::{averaged, campaign};
 use crate::common::{FOUR_SENSORS, rig};
 use runout_core::{
-    model::{closed_loop::Settings, diagnosis::Diagnosis, foresight::Foresight},
+    closed_loop::{Settings, diagnosis::Diagnosis, foresight::Foresight},
     rig::Rig,
 };
 use runout_spindle::{

@@ -7,8 +7,8 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use runout_core::{
     Complex64, Result,
+    closed_loop::Settings,
     measurement::{Block, Capture, SampleStream, StationTruth},
-    model::closed_loop::Settings,
     numerics::fourier::Fourier,
     separation::{Quantity, Separation},
     stage::{Station, StationDiagnosis, StationSeparator},

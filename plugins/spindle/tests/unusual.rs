@@ -4,7 +4,7 @@
 
 use crate::campaigns::{averaged, campaign, two_sections};
 use runout_core::{
-    model::{closed_loop::Settings, diagnosis::Verdict},
+    closed_loop::{Settings, diagnosis::Verdict},
     rig::SetupConfig,
 };
 use runout_spindle::{diagnose::diagnose, effects, layout::Layout, selection::Selection, simulate::SpindleConfig};

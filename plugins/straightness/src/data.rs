@@ -1,6 +1,6 @@
 //! The traces, and what part and slide come to.
 
-use runout_core::{model::Effect, numerics::least_squares::Basis};
+use runout_core::{closed_loop::Effect, numerics::least_squares::Basis};
 
 use crate::{
     effects::{Candidate, Place},

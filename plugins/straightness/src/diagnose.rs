@@ -2,11 +2,7 @@
 
 use runout_core::{
     Error, ErrorKind, Result,
-    model::{
-        Effect, Fit, Model, Setting,
-        closed_loop::{self, Closed, Settings},
-        diagnosis::Diagnosis,
-    },
+    closed_loop::{self, Closed, Effect, Fit, Model, Setting, Settings, diagnosis::Diagnosis},
     points::Points,
     stage::{PointDiagnosis, PointModel},
 };
@@ -283,7 +279,7 @@ impl AxialReversal {
         let mut said = Vec::new();
         let added = &closed.diagnosis.added;
         if !added.is_empty() {
-            let shift = |one: &runout_core::model::diagnosis::Added| {
+            let shift = |one: &runout_core::closed_loop::diagnosis::Added| {
                 let value = one.parameters.first().map_or(f64::NAN, |parameter| parameter.value);
                 let others = if one.confounded_with.is_empty() { "" } else { " (or another trace against it)" };
                 format!("{} by {value:.3} mm{others}", one.targets.join(", "))

@@ -10,7 +10,7 @@
 //! Offset and slope belong to every trace, so that a drift linear in time, and a tilt of the part in the sensitive
 //! direction, are taken out of every result.
 
-use runout_core::model::{Effect, Parameter, Setting};
+use runout_core::closed_loop::{Effect, Parameter, Setting};
 
 /// An effect, whatever it acts on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,8 +1,8 @@
 //! What the traces say of themselves: their contrasts, and each beside the others.
 
 use runout_core::{
+    closed_loop::{Setting, tested::Tested},
     consistency::{Check, Kind, LinearFit, Structure, Test, judge},
-    model::{Setting, tested::Tested},
     numerics::least_squares::Basis,
 };
 

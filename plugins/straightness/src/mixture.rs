@@ -1,6 +1,6 @@
 //! Results of equivalent fits in one, and how it differs from another result.
 
-use runout_core::{model::diagnosis::Moved, standards::straightness::strt_lsli_um};
+use runout_core::{closed_loop::diagnosis::Moved, standards::straightness::strt_lsli_um};
 
 use crate::{moves::rms, straightness::Straightness};
 

@@ -10,8 +10,8 @@ use std::sync::{Arc, OnceLock};
 
 use runout_core::{
     Error, ErrorKind, Result,
+    closed_loop::{Bias, Effect, Fit, Model, Outcome, Remainder, Setting, diagnosis::Unexplained, tested::Tested},
     consistency::Check,
-    model::{Bias, Effect, Fit, Model, Outcome, Remainder, Setting, diagnosis::Unexplained, tested::Tested},
     numerics::least_squares::Basis,
 };
 

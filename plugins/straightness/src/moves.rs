@@ -1,7 +1,7 @@
 //! What part and slide come to with effects applied, and how they change with each parameter.
 
 use runout_core::{
-    model::{Bias, Setting},
+    closed_loop::{Bias, Setting},
     numerics::least_squares::Basis,
 };
 

@@ -2,8 +2,8 @@
 
 use runout_core::{
     Error, ErrorKind, Result,
+    closed_loop::Fit as _,
     fault::{Fault, known_names},
-    model::Fit as _,
     numerics::number::significant,
     pipeline::{Context, StageConfig},
     points::{

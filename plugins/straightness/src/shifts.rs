@@ -1,6 +1,6 @@
 //! Shifts of traces along z, and what the data leave open of the shift between the setups.
 
-use runout_core::model::Fit;
+use runout_core::closed_loop::Fit;
 
 use crate::{
     data::Data,

@@ -4,8 +4,8 @@
 
 use crate::common::{Campaign, ground, rms};
 use runout_core::{
+    closed_loop::{Settings, diagnosis::Diagnosis},
     consistency::{Check, Test},
-    model::{closed_loop::Settings, diagnosis::Diagnosis},
 };
 use runout_straightness::{AxialReversal, AxialReversalConfig, Straightness};
 
@@ -59,8 +59,9 @@ fn a_gain_beside_a_walk_is_found() {
         let mut campaign = walking(400 + seed, [2, 3]);
         campaign.traces[3].gain = 0.2;
         let (diagnosis, _) = diagnosed(&campaign);
-        let is_gain =
-            |one: &runout_core::model::diagnosis::Added| one.effect == "sensor-gain" && one.targets == ["reversed-2"];
+        let is_gain = |one: &runout_core::closed_loop::diagnosis::Added| {
+            one.effect == "sensor-gain" && one.targets == ["reversed-2"]
+        };
         found += usize::from(diagnosis.added.len() == 1 && diagnosis.added.iter().any(is_gain));
     }
     assert!(found >= 4, "{found} of 5");

@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
 use crate::common::{Campaign, Shot, ground, rms};
-use runout_core::model::{closed_loop::Settings, diagnosis::Diagnosis};
+use runout_core::closed_loop::{Settings, diagnosis::Diagnosis};
 use runout_straightness::{AxialReversal, AxialReversalConfig, Straightness};
 
 fn separator(slide_cutoff_mm: Option<f64>) -> AxialReversal {
@@ -32,7 +32,7 @@ fn errors(campaign: &Campaign, found: &Straightness) -> [f64; 2] {
 
 /// "effect target" of all that was added, with what it is confounded with.
 fn named(diagnosis: &Diagnosis) -> Vec<Vec<String>> {
-    let of = |one: &runout_core::model::diagnosis::Added| {
+    let of = |one: &runout_core::closed_loop::diagnosis::Added| {
         let mut names = vec![format!("{} {}", one.effect, one.targets.join(" "))];
         names.extend(one.confounded_with.iter().cloned());
         names

@@ -2,13 +2,12 @@
 
 use runout_core::{
     Error, Result,
-    consistency::Check,
-    model::{
-        Effect, Fit, Setting,
-        closed_loop::{self, Closed, Settings},
+    closed_loop::{
+        self, Closed, Effect, Fit, Setting, Settings,
         diagnosis::{BiasPerUnit, Blind, Diagnosis, Unexplained, Verdict},
         linear_terms::{Declared, LinearFit, LinearTerms, Observations, Term},
     },
+    consistency::Check,
     points::Points,
     stage::{Outcome, PointDiagnosis, PointModel},
     summary::{Value, moved},

@@ -1,6 +1,6 @@
 //! What the declared model may lack: the machine, a drift, and orders above those declared.
 
-use runout_core::model::{Effect, Parameter};
+use runout_core::closed_loop::{Effect, Parameter};
 
 use crate::{
     config::TouchProbeConfig,

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use runout_core::{
     Complex64, Result,
-    model::diagnosis::LostOrders,
+    closed_loop::diagnosis::LostOrders,
     separation::{Quantity, Residual, SectionAt, Separation},
     stage::{Evaluable, Form, Outcome, far_below_noise},
     summary::Value,

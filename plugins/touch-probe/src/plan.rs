@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 
 use runout_core::{
     Complex64,
-    model::{
+    closed_loop::{
         diagnosis::LostOrders,
         foresight::{Foresight, foresee},
     },

@@ -2,9 +2,9 @@
 
 use runout_core::{
     Error, ErrorKind, Result,
+    closed_loop::diagnosis::LostOrders,
     consistency::refuted_by,
     fault::Fault,
-    model::diagnosis::LostOrders,
     pipeline::{Context, StageConfig},
     points::{
         PointColumn,

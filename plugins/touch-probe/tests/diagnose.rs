@@ -4,8 +4,8 @@
 
 use crate::support::{config, scenario, setups};
 use runout_core::{
-    model::{
-        closed_loop::Settings,
+    closed_loop::{
+        Settings,
         diagnosis::{Diagnosis, Verdict},
     },
     stage::{PointDiagnosis, PointSeparator},

@@ -5,7 +5,7 @@
 use std::path::PathBuf;
 
 use runout_core::{
-    model::diagnosis::Verdict,
+    closed_loop::diagnosis::Verdict,
     pipeline::{Pipeline, Registry, diagnose::diagnose, document::Sources, run::Silent},
     stage::Simulation,
 };

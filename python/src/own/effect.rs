@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use numpy::{Complex64, PyArray1};
 use pyo3::{exceptions::PyValueError, prelude::*, types::PyTuple};
-use runout_core::{Error, ErrorKind, model::Parameter};
+use runout_core::{Error, ErrorKind, closed_loop::Parameter};
 use runout_spindle::effects::{ChannelTransfer, differences};
 
 use super::{Object, numbers};

@@ -17,7 +17,7 @@ use numpy::{Complex64, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntyped
 use pyo3::{exceptions::PyValueError, prelude::*};
 use runout_cli::Failure;
 use runout_core::{
-    model::Parameter,
+    closed_loop::Parameter,
     pipeline::{Plugin, Registry},
     stage::Separator,
 };

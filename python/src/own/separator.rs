@@ -6,9 +6,9 @@ use numpy::{Complex64, PyArray1, PyArray3, PyArrayMethods};
 use pyo3::{exceptions::PyValueError, prelude::*};
 use runout_core::{
     Error, ErrorKind, Result,
+    closed_loop::foresight::Foresight,
     effects::EffectCatalogue,
     fault::Fault,
-    model::foresight::Foresight,
     pipeline::Context,
     rig::Rig,
     separation::{Assessment, Sensitivity, Separation},

@@ -2,11 +2,11 @@
 
 use runout_core::{
     Complex64, Error, Result,
-    measurement::StationTruth,
-    model::{
-        closed_loop::Settings,
+    closed_loop::{
+        Settings,
         diagnosis::{Added, Diagnosis, Verdict},
     },
+    measurement::StationTruth,
     numerics::fourier::Fourier,
     pipeline::put_right,
     separation::{Quantity, Separation},

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use runout_core::model::diagnosis::Verdict;
+use runout_core::closed_loop::diagnosis::Verdict;
 
 use super::{
     draw::{EFFECTS, Kind, Layout, STRANGERS},

@@ -7,8 +7,8 @@ use std::{fmt::Write as _, path::Path};
 
 use runout_core::{
     Error, Result,
+    closed_loop::diagnosis::{Diagnosis, Verdict},
     consistency::Check,
-    model::diagnosis::{Diagnosis, Verdict},
     pipeline::{
         INCLUDE_KEY, Pipeline, Registry,
         diagnose::diagnose,

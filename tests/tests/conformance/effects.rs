@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use runout_core::{
+    closed_loop::{Fit, Model, Setting},
     effects::EffectEntry,
-    model::{Fit, Model, Setting},
     pipeline::{Registry, Route},
     stage::{AverageRequest, Loader, Source, Station},
 };

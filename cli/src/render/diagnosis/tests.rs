@@ -1,5 +1,5 @@
 use insta::assert_snapshot;
-use runout_core::model::diagnosis::{BiasPerUnit, LostOrders, Moved, Refused, Truth, Unexplained, Verdict};
+use runout_core::closed_loop::diagnosis::{BiasPerUnit, LostOrders, Moved, Refused, Truth, Unexplained, Verdict};
 
 use super::*;
 use crate::render::wrap::within;

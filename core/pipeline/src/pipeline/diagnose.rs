@@ -26,7 +26,7 @@ use crate::{
     summary::Summary,
 };
 use runout_closed_loop::{
-    Effect, Setting, closed_loop,
+    Effect, Setting, Settings,
     correction::Correction,
     diagnosis::{Diagnosis, Estimated, Step, Truth},
 };
@@ -221,7 +221,7 @@ fn diagnose_points(
         pipeline.diagnose.settings.clone()
     };
     let known = known(&effects, &settings.known, |_| Vec::new());
-    let mut found = model.diagnose(points, &closed_loop::Settings { max_added: MOST_ADDED, ..settings })?;
+    let mut found = model.diagnose(points, &Settings { max_added: MOST_ADDED, ..settings })?;
     let checks = measured::checks(points, &separator.columns());
     found.diagnosis.refute(&checks);
     found.after.checks.extend(checks);

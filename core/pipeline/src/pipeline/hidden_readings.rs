@@ -7,7 +7,7 @@
 //! interruption stays as it was bridged: no reading says.
 
 use crate::stage::{Station, StationDiagnosis, StationModel, StationSeparator};
-use runout_closed_loop::{closed_loop::Settings, diagnosis::Verdict};
+use runout_closed_loop::{Settings, diagnosis::Verdict};
 use runout_error::Result;
 use runout_numerics::{Complex64, fourier::Fourier, least_squares::dot};
 use runout_turning::{

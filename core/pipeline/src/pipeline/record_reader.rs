@@ -16,7 +16,7 @@ use super::{
     read_ahead::{Captures, read_ahead, read_along, work_behind},
 };
 use crate::stage::{AverageRequest, Averager, Conditioner, Station, StationSeparator};
-use runout_closed_loop::closed_loop::Settings;
+use runout_closed_loop::Settings;
 use runout_consistency::turns::PhaseCourse;
 use runout_error::{Error, ErrorKind, Result};
 use runout_numerics::{number::significant, threads};

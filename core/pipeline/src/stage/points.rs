@@ -6,8 +6,7 @@ use crate::{
     summary::Value,
 };
 use runout_closed_loop::{
-    Effect, Fit, Model,
-    closed_loop::{self, Settings},
+    Effect, Fit, Model, Settings, diagnose,
     diagnosis::{Diagnosis, LostOrders},
     linear_terms::{LinearFit, LinearTerms},
 };
@@ -198,7 +197,7 @@ impl<M: LinearModel> PointModel for M {
 
     fn diagnose(&self, points: &Points, settings: &Settings) -> Result<PointDiagnosis> {
         let terms = self.terms(points)?.with_known(&settings.known).considering(settings.effects.as_deref());
-        let closed = closed_loop::diagnose(&terms, settings)?;
+        let closed = diagnose(&terms, settings)?;
         let mut after = self.outcome(points, &closed.after)?;
         after.checks.extend(closed.diagnosis.consistency.iter().cloned());
         after.tables.push(residual_rows(&terms, &closed.before, &closed.after)?);

@@ -2,7 +2,7 @@
 
 use super::points::PointSeparator;
 use crate::effects::EffectCatalogue;
-use runout_closed_loop::{Effect, Setting, closed_loop::Settings, diagnosis::Diagnosis, foresight::Foresight};
+use runout_closed_loop::{Effect, Setting, Settings, diagnosis::Diagnosis, foresight::Foresight};
 use runout_error::{Result, fault::Fault};
 use runout_turning::{
     profile::Profile,

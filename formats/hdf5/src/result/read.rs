@@ -8,7 +8,7 @@ use hdf5_metno::{
 };
 use runout_core::{
     Error, ErrorKind, Result,
-    model::diagnosis::Diagnosis,
+    closed_loop::diagnosis::Diagnosis,
     stage::About,
     summary::Summary,
     surface::Surface,

@@ -6,8 +6,8 @@ use arrow_array::{Array, Float64Array, RecordBatch, StringArray, cast::AsArray};
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use runout_core::{
     Error, Result,
+    closed_loop::diagnosis::Diagnosis,
     input_file::{open_regular, read_text},
-    model::diagnosis::Diagnosis,
 };
 
 /// Displacement and tilt of the axis.

@@ -3,11 +3,11 @@
 #![allow(dead_code, clippy::unwrap_used, reason = "tests, which use a part each")]
 
 use runout_core::{
-    height_grid::HeightGrid,
-    model::{
-        closed_loop::Settings,
+    closed_loop::{
+        Settings,
         diagnosis::{Added, Diagnosis},
     },
+    height_grid::HeightGrid,
     points::Points,
     stage::{Outcome, PointDiagnosis, PointSeparator},
 };

@@ -1,6 +1,6 @@
 //! What no layout of a rig shows, whatever is fitted, and what it does to form or motion all the same.
 
-use runout_core::model::{
+use runout_core::closed_loop::{
     Fit,
     diagnosis::{BiasPerUnit, Blind},
 };

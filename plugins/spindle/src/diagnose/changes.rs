@@ -5,8 +5,8 @@
 
 use runout_core::{
     Complex64,
+    closed_loop::diagnosis::Unexplained,
     level_step::{LevelStep, level_step},
-    model::diagnosis::Unexplained,
     numerics::least_squares::{cholesky, invert_lower},
     profile::{Profile, Turns, smooth},
     stage::Station,

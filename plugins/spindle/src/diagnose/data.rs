@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use runout_core::{
     Complex64, Error, ErrorKind, Result,
-    model::{Effect, Setting},
+    closed_loop::{Effect, Setting},
     profile::{self, Profile, Split},
     stage::Station,
 };

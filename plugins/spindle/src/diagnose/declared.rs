@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use runout_core::{
     Result,
+    closed_loop::{Effect, Setting, Settings},
     effects::EffectCatalogue,
-    model::{Effect, Setting, closed_loop::Settings},
     profile::Profile,
     stage::{Station, StationDiagnosis, StationModel},
 };

@@ -6,12 +6,12 @@ use std::sync::Arc;
 
 use runout_core::{
     Complex64, Error, ErrorKind, Result,
-    consistency::{Check, Test, linear},
-    model::{
+    closed_loop::{
         Bias, Fit, OpenWithinBound, Outcome, Remainder, Setting,
         diagnosis::Unexplained,
         evidence::{Group, far_worse},
     },
+    consistency::{Check, Test, linear},
     separation::{Quantity, Residual, Separation},
     stage::Station,
 };

@@ -2,7 +2,7 @@
 
 use runout_core::{
     Result,
-    model::{
+    closed_loop::{
         Fit, Model, Setting,
         diagnosis::{BiasPerUnit, Blind, Diagnosis},
     },

@@ -22,9 +22,8 @@ use std::sync::Arc;
 
 use runout_core::{
     Complex64, Result,
-    model::{
-        Effect, Fit, Model, Setting,
-        closed_loop::{self, Settings},
+    closed_loop::{
+        self, Effect, Fit, Model, Setting, Settings,
         diagnosis::{Blind, Estimated, LostOrders, Unexplained, Verdict},
     },
     separation::NOTHING_SEPARATED,

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use runout_core::{Complex64, consistency::Structure, model::Remainder};
+use runout_core::{Complex64, closed_loop::Remainder, consistency::Structure};
 
 use super::{
     data::{Shared, StationData},

@@ -1,6 +1,6 @@
 //! The keys of a rig that would declare what effects change, as lines of TOML.
 
-use runout_core::model::diagnosis::rounded;
+use runout_core::closed_loop::diagnosis::rounded;
 
 use crate::{
     effects::{Alterations, RigKey},

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use runout_core::{
     Complex64,
-    model::{diagnosis::Unexplained, evidence::Group},
+    closed_loop::{diagnosis::Unexplained, evidence::Group},
     numerics::fourier::Fourier,
     rig::Rig,
 };

@@ -1,7 +1,7 @@
 //! `axial-motion`: the part moves along z by w(Φ), so that sensors see it elsewhere; with its slope from one section to the
 //! next, the reading changes by −w·∂h/∂z. For w = a cos nΦ + b sin nΦ: ∂/∂a = −cos nΦ ∂h/∂z, ∂/∂b = −sin nΦ ∂h/∂z.
 
-use runout_core::{Complex64, model::diagnosis::Estimated};
+use runout_core::{Complex64, closed_loop::diagnosis::Estimated};
 
 use super::{About, ActsOn, Alterations, Harmonic, Predicted, SpindleEffect, as_amplitude, last_order, parameter};
 

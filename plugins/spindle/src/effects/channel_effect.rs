@@ -6,7 +6,7 @@ use std::{
     sync::{Arc, Mutex, PoisonError},
 };
 
-use runout_core::{Complex64, Error, model::Parameter};
+use runout_core::{Complex64, Error, closed_loop::Parameter};
 
 use super::{About, ActsOn, Alterations, Predicted, SpindleEffect, Transfer};
 

@@ -15,7 +15,7 @@ use std::f64::consts::SQRT_2;
 
 use runout_core::{
     Complex64,
-    model::{diagnosis::Estimated, in_tolerances},
+    closed_loop::{diagnosis::Estimated, in_tolerances},
 };
 
 use crate::alterations::GAINS;

@@ -35,8 +35,8 @@ use std::sync::Arc;
 
 use runout_core::{
     Complex64, Error,
+    closed_loop::{Parameter, diagnosis::Estimated, in_tolerances},
     effects::EffectEntry,
-    model::{Parameter, diagnosis::Estimated, in_tolerances},
     rig::Rig,
 };
 

@@ -15,7 +15,7 @@ use std::f64::consts::TAU;
 
 use runout_core::{
     Complex64,
-    model::{Parameter, diagnosis::Estimated},
+    closed_loop::{Parameter, diagnosis::Estimated},
 };
 
 use super::{About, ActsOn, Alterations, Predicted, SpindleEffect, as_amplitude, parameter};

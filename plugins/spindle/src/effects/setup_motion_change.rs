@@ -1,7 +1,7 @@
 //! `setup-motion-change`: in a setup the spindle moves (1 + r) times as much as in the first. ∂/∂r = motion along the
 //! sensor.
 
-use runout_core::{Complex64, model::diagnosis::Estimated};
+use runout_core::{Complex64, closed_loop::diagnosis::Estimated};
 
 use super::{About, ActsOn, Alterations, Predicted, SpindleEffect, parameter};
 

@@ -2,7 +2,7 @@
 //! is at φ + ε(φ), ε = a (cos nφ − 1) + b sin nφ, 0 at the pulses. ∂/∂a = u'(Φ) (cos nΦ − 1), ∂/∂b = u'(Φ) sin nΦ.
 //! a and b are in degrees, as in a scenario.
 
-use runout_core::{Complex64, model::diagnosis::Estimated};
+use runout_core::{Complex64, closed_loop::diagnosis::Estimated};
 
 use super::{
     About, ActsOn, Alterations, Harmonic, Predicted, RAD_PER_DEG, SpindleEffect, as_amplitude, last_order, parameter,

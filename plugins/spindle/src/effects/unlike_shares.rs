@@ -7,7 +7,7 @@
 //! `bracket-motion`: its bracket moves by a share s of the spindle's motion, of which it reads (1 − s); form is not changed. ∂/∂s = −motion
 //! along the sensor. A signal that the spindle's motion adds to one channel (`s` of either sign) is the same.
 
-use runout_core::{Complex64, model::diagnosis::Estimated};
+use runout_core::{Complex64, closed_loop::diagnosis::Estimated};
 
 use super::{About, ActsOn, Alterations, Predicted, SpindleEffect, parameter};
 use crate::layout::{ENOUGH, Layout, Reading};

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use runout_core::{
     Result,
-    model::foresight::{self, Foresight, NotVisible},
+    closed_loop::foresight::{self, Foresight, NotVisible},
     rig::Rig,
 };
 

@@ -4,9 +4,9 @@ use std::{f64::consts::TAU, marker::PhantomData};
 
 use runout_core::{
     Complex64, Result,
+    closed_loop::foresight::Foresight,
     effects::EffectCatalogue,
     fault::Fault,
-    model::foresight::Foresight,
     pipeline::{Context, StageConfig},
     rig::Rig,
     separation::{Assessment, Quantity, Sensitivity, Separation},

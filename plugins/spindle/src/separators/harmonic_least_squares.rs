@@ -2,9 +2,9 @@
 
 use runout_core::{
     Result,
+    closed_loop::foresight::Foresight,
     effects::EffectCatalogue,
     fault::Fault,
-    model::foresight::Foresight,
     pipeline::{Context, StageConfig},
     rig::Rig,
     separation::{Assessment, Sensitivity, Separation},

@@ -2,8 +2,8 @@
 
 use runout_core::{
     Error, Result,
-    model::{
-        closed_loop::Settings,
+    closed_loop::{
+        Settings,
         diagnosis::{Added, Diagnosis, Verdict},
     },
     stage::PointModel,

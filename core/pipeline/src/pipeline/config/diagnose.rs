@@ -9,7 +9,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use crate::{pipeline::put_right, stage::SourceKind};
-use runout_closed_loop::{Effect, Setting, closed_loop::Settings};
+use runout_closed_loop::{Effect, Setting, Settings};
 use runout_error::fault::{Fault, known_names};
 
 /// `[diagnose]`: what the closed loop may consider. `run` leaves it alone.

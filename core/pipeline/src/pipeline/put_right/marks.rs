@@ -4,7 +4,7 @@
 use std::f64::consts::TAU;
 
 use runout_closed_loop::{
-    closed_loop::Settings,
+    Settings,
     diagnosis::{Added, Estimated, rounded},
 };
 use runout_consistency::turns::PhaseCourse;

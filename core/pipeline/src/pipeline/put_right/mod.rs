@@ -6,8 +6,7 @@ mod stations;
 
 use left::Left;
 use runout_closed_loop::{
-    Parameter,
-    closed_loop::Settings,
+    Parameter, Settings,
     diagnosis::{Added, Step},
 };
 use runout_error::Result;

@@ -2,7 +2,7 @@
 
 use std::{f64::consts::TAU, fmt::Write};
 
-use runout_core::model::diagnosis::{Diagnosis, Verdict};
+use runout_core::closed_loop::diagnosis::{Diagnosis, Verdict};
 
 /// Eight circles of 200 points, z 2 to 16 mm, with noise of 0.5 µm; `more` is what is added at (circle, angle, z).
 fn diagnosed(more: impl Fn(usize, f64, f64) -> f64) -> Diagnosis {

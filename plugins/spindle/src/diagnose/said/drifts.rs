@@ -1,7 +1,7 @@
 //! What is said of drifts: over the capture, their rate and time constant, and whether they are one.
 
 use runout_core::{
-    model::diagnosis::{Added, Diagnosis, Estimated},
+    closed_loop::diagnosis::{Added, Diagnosis, Estimated},
     rig::{Sensor, Setup},
 };
 

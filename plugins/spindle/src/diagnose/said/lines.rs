@@ -1,8 +1,8 @@
 //! What is said of lines: order, frequency, size, and whether it is the mains.
 
 use runout_core::{
+    closed_loop::diagnosis::{Diagnosis, Estimated},
     mains,
-    model::diagnosis::{Diagnosis, Estimated},
     rig::{Bearing, bearing_lines_near},
     stage::Station,
 };

@@ -102,7 +102,8 @@ fn a_hidden_gain_of_an_axial_sensor() {
     let bias = &blind.unwrap_or_else(|| panic!("{:?}", found.blind_to)).bias_per_unit;
     assert!(bias.on == "z" && bias.value > 0.3, "{bias:?}");
     for effect in ["sensor-axial-position", "sensor-angle"] {
-        let offered = |blind: &runout_core::model::diagnosis::Blind| blind.effect == effect && blind.targets == ["Z"];
+        let offered =
+            |blind: &runout_core::closed_loop::diagnosis::Blind| blind.effect == effect && blind.targets == ["Z"];
         assert!(!found.blind_to.iter().any(offered), "{effect} is none of a sensor on the axis");
     }
 }
@@ -117,7 +118,7 @@ fn other_effects_on_an_axial_sensor() {
     ] {
         let (found, _, after, truth) = diagnosed(&simulated(8, Rotation::Ccw, true, effect));
         let name = format!("{id} {target}");
-        let named = |added: &runout_core::model::diagnosis::Added| {
+        let named = |added: &runout_core::closed_loop::diagnosis::Added| {
             (added.effect == id && added.targets == [target]) || added.confounded_with.contains(&name)
         };
         assert!(found.added.iter().any(named), "{name}: {:?} {:?}", found.verdict, found.added);

@@ -1,6 +1,6 @@
 //! What the chain of a channel does: delays, low-passes, cross-talk, gains of one setup.
 
-use runout_core::model::diagnosis::Verdict;
+use runout_core::closed_loop::diagnosis::Verdict;
 use runout_spindle::simulate::SpindleConfig;
 
 use super::{CLEAN_UM, diagnosed};

@@ -4,8 +4,8 @@ use std::f64::consts::TAU;
 
 use runout_core::{
     Complex64, Result,
+    closed_loop::{Settings, diagnosis::Verdict},
     measurement::{Block, Capture, SampleStream},
-    model::{closed_loop::Settings, diagnosis::Verdict},
     numerics::fourier::Fourier,
     separation::Quantity,
     stage::StationDiagnosis,

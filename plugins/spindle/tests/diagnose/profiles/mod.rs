@@ -1,7 +1,7 @@
 //! What single sensors, setups or the spindle add to the form or take from it, with three sensors in each of two sections and three part
 //! angles.
 
-use runout_core::model::{Effect, Fit, Model, Setting, diagnosis::Verdict};
+use runout_core::closed_loop::{Effect, Fit, Model, Setting, diagnosis::Verdict};
 use runout_spindle::{diagnose::SpindleModel, effects, layout::Layout, selection::Selection, simulate::SpindleConfig};
 
 use super::{CLEAN_UM, diagnosed};

@@ -5,8 +5,8 @@ mod places;
 mod units;
 
 use runout_core::{
-    model::{
-        closed_loop::Settings,
+    closed_loop::{
+        Settings,
         diagnosis::{Added, Verdict},
     },
     rig::RigConfig,

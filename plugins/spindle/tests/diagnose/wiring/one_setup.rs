@@ -1,6 +1,6 @@
 //! Mistakes that were made in one setup, and channels in another unit.
 
-use runout_core::model::diagnosis::Verdict;
+use runout_core::closed_loop::diagnosis::Verdict;
 
 use super::{CLEAN_UM, diagnosed, name, names, reversed, six};
 

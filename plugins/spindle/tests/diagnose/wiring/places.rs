@@ -1,6 +1,6 @@
 //! Sensors and parts that are elsewhere: turned with the part, in the other section, far off.
 
-use runout_core::model::diagnosis::Verdict;
+use runout_core::closed_loop::diagnosis::Verdict;
 
 use super::{CLEAN_UM, diagnosed, name, names, six};
 
