@@ -238,10 +238,8 @@ fn a_number_of_pulses_that_the_zero_contradicts_is_refused() {
     let file = csv(RATE_HZ, 0.0, &[("S1", &s1), ("S2", &s2), ("A", &many), ("Z", &zero)], SAMPLES);
     let load = "path = \"a.csv\"\nmarker = { channel = \"A\" }\npulses_per_turn = 18\nzero = { channel = \"Z\" }";
     let problem = opened(&[("a.csv", file)], load, &rig(&["only"], Unit::Micrometre))
-        .and_then(|(_folder, recording)| {
-            let setup = recording.stations()[0].setups[0].clone();
-            recording.open(0, &setup).map(|_| ()).map_err(|error| error.to_string())
-        })
-        .unwrap_err();
+        .and_then(|(_folder, recording)| recording.open(0, 0).map(drop))
+        .unwrap_err()
+        .to_string();
     assert!(problem.contains("expected 18 pulses from a zero to the next, found 16"), "{problem}");
 }

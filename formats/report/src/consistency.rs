@@ -1,7 +1,7 @@
 //! The tests of the data on themselves: what was tested, what it found, what was done.
 
 use maud::{Markup, html};
-use runout_core::{consistency::Check, summary::Summary, table::number::significant};
+use runout_core::{consistency::Check, numerics::number::significant, summary::Summary};
 
 /// Tests that are listed; all are in the table `consistency`.
 const MOST: usize = 60;

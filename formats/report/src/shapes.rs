@@ -1,8 +1,8 @@
 //! Reference circles and vectors as the page's program takes them.
 
-use runout_core::table::{
-    number::with_std,
-    panels::{Arrow, Circle, Curve, Panels},
+use runout_core::{
+    numerics::number::with_std,
+    table::panels::{Arrow, Circle, Curve, Panels},
 };
 use serde::Serialize;
 

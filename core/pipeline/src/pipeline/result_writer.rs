@@ -14,7 +14,7 @@ use super::{
 };
 use crate::{
     atomic_file::{FolderLock, PendingFile, commit_all, commit_last_after_others},
-    stage::{About, Completed, Export, Exporter, OwnValues, PointSeparator, ResultInfo, Takes},
+    stage::{About, Completed, Export, Exporter, PointSeparator, ResultInfo, Takes},
     summary::{LostOrders, PartSummary, Summary, SurfaceSummary, Value},
 };
 use runout_closed_loop::{correction::Correction, diagnosis, diagnosis::Diagnosis};
@@ -91,8 +91,6 @@ impl ResultWriter {
         let outputs = written(exporters, &pipeline.tables);
         let files = outputs.iter().map(PathBuf::as_path);
         let lock = if pipeline.in_data_set { FolderLock::covering(files) } else { FolderLock::of(files) }?;
-        let exports: Result<Vec<_>> = exporters.iter().map(|exporter| exporter.begin(&info)).collect();
-        let evaluations = Evaluations::begin(&pipeline.evaluators, &info)?;
         let tested = pipeline.route.point_separator().is_some_and(PointSeparator::needs_surface);
         let takes = |takes: Takes| exporters.iter().any(|exporter| exporter.takes() == takes);
         let evaluate = pipeline.evaluate.clone();
@@ -104,9 +102,9 @@ impl ResultWriter {
         };
         let gathered = surface != SurfaceUse::Unused || evaluate.has(Group::Cylindricity);
         Ok(Self {
-            exports: exports?,
-            tables_wanted: takes(Takes::Tables) || takes(Takes::TablesAndSurface) || !evaluations.is_empty(),
-            evaluations,
+            exports: exporters.iter().map(|exporter| exporter.begin(&info)).collect::<Result<_>>()?,
+            tables_wanted: takes(Takes::Tables) || takes(Takes::TablesAndSurface) || !pipeline.evaluators.is_empty(),
+            evaluations: Evaluations::begin(&pipeline.evaluators, &info)?,
             specs: pipeline.tables.clone(),
             station_tables: StationTables::new(pipeline.assessment.as_ref(), pipeline.rig.as_ref())
                 .of_stations(stations.len()),
@@ -163,18 +161,18 @@ impl ResultWriter {
     /// Takes the values of the evaluators, and gives what they remark.
     fn evaluate(&mut self) -> Result<Vec<String>> {
         let known = if self.evaluations.is_empty() { Vec::new() } else { self.value_rows()? };
-        let OwnValues { values, remarks } = self.evaluations.finish(&self.specs, &known, &self.summary)?;
-        self.summary.values.extend(values);
-        Ok(remarks)
+        let found = self.evaluations.finish(&self.specs, &known, &self.summary)?;
+        self.summary.values.extend(found.values);
+        Ok(found.remarks)
     }
 
     /// Rows of the tables of values.
     fn value_rows(&self) -> Result<Vec<TableRows>> {
+        let own = &self.summary.values;
         if !self.of_form {
-            return Ok(vec![named_value_rows(&self.summary.values, false)?]);
+            return Ok(vec![named_value_rows(own, false)?]);
         }
-        let named = !self.summary.values.is_empty();
-        let named = named.then(|| named_value_rows(&self.summary.values, true)).transpose()?;
+        let named = (!own.is_empty()).then(|| named_value_rows(own, true)).transpose()?;
         Ok(std::iter::once(self.station_tables.value_rows(&self.summary)?).chain(named).collect())
     }
 
