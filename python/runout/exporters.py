@@ -269,26 +269,42 @@ class Controller:
     bed_z_mm: Union[float, None] = None
     """klipper: height of the bed at which its mesh is computed, in mm."""
 
-    dialect: Union[Literal['siemens-enc-comp'], Literal['siemens-cec'], Literal['isg-csv'], Literal['etalon'], Literal['linuxcnc'], Literal['klipper']]
+    com: Union[Mapping[str, Any], None] = None
+    """heidenhain: names of the tables of compensation values, beside `path`, by the axis whose position counts: `{ X = "x.com" }`."""
+
+    detection_unit: Union[Mapping[str, Any], None] = None
+    """fanuc-pitch, fanuc-3d: detection unit of each axis, in mm or °: `{ X = 0.001 }`."""
+
+    dialect: Union[Literal['siemens-enc-comp'], Literal['siemens-cec'], Literal['isg-csv'], Literal['etalon'], Literal['linuxcnc'], Literal['klipper'], Literal['heidenhain'], Literal['fanuc-pitch'], Literal['fanuc-3d']]
     """Whose file it is."""
+
+    first_point: Union[int, None] = None
+    """fanuc-pitch: number of the first compensation point that the file may use. Default: 0."""
 
     first_table: Union[int, None] = None
     """siemens-cec: index of the first table. Default: 0."""
 
+    largest_value: Union[int, None] = None
+    """fanuc-pitch, fanuc-3d: largest value at a point, without its sign; 7 of pitch errors and 127 of boxes without it."""
+
     leave_out: Union[Sequence[str], None] = None
     """Errors that the file shall not hold: `["EAX", "EC0Y"]`. What the dialect cannot hold has to be named here."""
+
+    magnification: Union[int, None] = None
+    """fanuc-pitch, fanuc-3d: magnification of the values, parameter 3623 of pitch errors. Default: 1."""
 
     most_points: Union[int, None] = None
     """Points of a table that the control has memory for; more are an error."""
 
     most_tables: Union[int, None] = None
-    """siemens-cec: tables that the control has."""
+    """siemens-cec, heidenhain: tables (heidenhain: dependencies of one axis on another or on itself) that the control has."""
 
     path: str
     """The file to write."""
 
     positive_moves: Union[Union[Literal['positive'], Literal['negative']], None] = None
-    """siemens-cec: where a positive value of the table moves the axis. Write one table by hand and look: manuals differ."""
+    """siemens-cec, heidenhain, fanuc-pitch, fanuc-3d: where a positive value of the table moves the axis. Write one table by hand
+    and look: manuals differ."""
 
     zero_at: Union[Mapping[str, Any], None] = None
     """Position of each axis where its positioning correction is 0, in mm or °: that of its reference point. `{ X = 0.0 }`."""

@@ -336,6 +336,56 @@ class Drift:
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
+class Diagonals:
+    """Positioning along body and face diagonals by ISO 230-6: E, B, R, A, M of each, the largest of all"""
+
+    plugin: ClassVar[str] = "diagonals"
+
+    scale_std_ppm: Union[float, None] = None
+    """Standard uncertainty of the scale, by the instrument's certificate and the temperatures, in µm/m. Default: 0.0."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Probing:
+    """Performance of a probe on a machine tool by ISO 230-10: P_FTU of a sphere or a ring, repeatability R_SPT and R_PTL"""
+
+    plugin: ClassVar[str] = "probing"
+
+    object: Union[Literal['point'], Literal['ring'], Literal['sphere']]
+    """What was touched."""
+
+    tool_changed: Union[bool, None] = None
+    """Whether the probe was changed in the spindle between sets (ring and sphere): the centre of each set is then evaluated too.
+    Default: false."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class RotaryPath:
+    """Paths of a rotary axis and linear axes by ISO 10791-6, BK1 to BK4: radial, tangential and axial deviation of an R-test"""
+
+    plugin: ClassVar[str] = "rotary-path"
+
+    axis: Union[Literal['A'], Literal['B'], Literal['C']]
+    """The axis whose command is the place on the path: "A", "B" or "C"."""
+
+    balls: Sequence[Mapping[str, Any]]
+    """Places of the balls at command 0 of the axis, which runs through the origin."""
+
+    test: Union[Literal['BK1'], Literal['BK2'], Literal['BK3'], Literal['BK4']]
+    """The test, as the standard names it."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class StructuralMotion:
+    """Motion with the spindle still by ISO 230-7: peak to valley of each axis within a stated time"""
+
+    plugin: ClassVar[str] = "structural-motion"
+
+    window_s: float
+    """Time over which a peak to valley is taken, in s."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
 class RotorModes:
     """Natural frequencies, Campbell diagram and critical speeds of a rotor"""
 

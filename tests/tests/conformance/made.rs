@@ -6,6 +6,7 @@ use std::{f64::consts::TAU, fmt::Write};
 ///
 /// # Panics
 /// When there is none of that name.
+#[allow(clippy::too_many_lines, reason = "the points of one separator after the other")]
 pub(crate) fn points(name: &str) -> String {
     let mut text = String::new();
     match name {

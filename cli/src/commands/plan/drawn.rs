@@ -3,15 +3,12 @@
 use std::{path::Path, slice};
 
 use runout_core::{
+    numerics::number::{ranges, significant},
     pipeline::document::{self, Document, Sources},
     provenance::{Provenance, VERSION},
     rig::Rig,
     stage::{NoiseGain, Overview},
-    table::{
-        ColumnSpec, Figure, Measure, RecordBatch, TableSpec, counts,
-        number::{ranges, significant},
-        numbers_or_null, texts,
-    },
+    table::{ColumnSpec, Figure, Measure, RecordBatch, TableSpec, counts, numbers_or_null, texts},
 };
 
 use super::{assess, map::Layout};
