@@ -1,7 +1,7 @@
 //! Pipelines to start from, one a separator: `runout new` writes them.
 
 /// Names of separators with the text of a pipeline that passes `runout check`.
-pub(crate) const TEMPLATES: [(&str, &str); 21] = [
+pub(crate) const TEMPLATES: [(&str, &str); 25] = [
     ("as-measured", include_str!("templates/as-measured.toml")),
     ("axial-reversal", include_str!("templates/axial-reversal.toml")),
     ("donaldson-reversal", include_str!("templates/donaldson-reversal.toml")),
@@ -13,14 +13,18 @@ pub(crate) const TEMPLATES: [(&str, &str); 21] = [
     ("multi-step", include_str!("templates/multi-step.toml")),
     ("quadrature", include_str!("templates/quadrature.toml")),
     ("positioning", include_str!("templates/positioning.toml")),
+    ("probing", include_str!("templates/probing.toml")),
     ("circular", include_str!("templates/circular.toml")),
+    ("diagonals", include_str!("templates/diagonals.toml")),
     ("drift", include_str!("templates/drift.toml")),
     ("r-test", include_str!("templates/r-test.toml")),
     ("rotary-axis", include_str!("templates/rotary-axis.toml")),
     ("rotary-axis-circle-fit", include_str!("templates/rotary-axis-circle-fit.toml")),
     ("rotary-axis-three-point", include_str!("templates/rotary-axis-three-point.toml")),
+    ("rotary-path", include_str!("templates/rotary-path.toml")),
     ("rotor-modes", include_str!("templates/rotor-modes.toml")),
     ("spatial-error", include_str!("templates/spatial-error.toml")),
+    ("structural-motion", include_str!("templates/structural-motion.toml")),
     ("three-point", include_str!("templates/three-point.toml")),
     ("touch-probe", include_str!("templates/touch-probe.toml")),
 ];

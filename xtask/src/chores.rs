@@ -63,8 +63,8 @@ pub(crate) fn test(foreign_readers: bool, complete: bool) -> Outcome {
         std::thread::scope(|scope| {
             let program = program.display().to_string();
             let worker = target().join("debug/examples/many_command_lines").display().to_string();
-            let inputs = scope.spawn(move || fuzz::fuzz(&["--minutes", "2", &worker]));
-            kill_test::test(&["--kills", "100", &program])?;
+            let inputs = scope.spawn(move || fuzz::fuzz(&["--minutes", "1", &worker]));
+            kill_test::test(&["--kills", "60", &program])?;
             package()?;
             inputs.join().map_err(|_| "the fuzz run ended early".to_owned())?
         })?;

@@ -227,6 +227,10 @@ impl PointSeparator for Diagonals {
                 "deviation is actual less commanded distance along the diagonal; + is an approach ahead along it".into(),
             tables: vec![rows(&all)?],
             values: values.into_iter().zip(of).map(|(value, of)| value.of(&of)).collect(),
+            checks: all
+                .iter()
+                .flat_map(|one| one.approaches.alike(&one.noise, "mm").into_iter().map(|check| check.within(&one.id)))
+                .collect(),
             remarks: said,
             ..Outcome::default()
         })

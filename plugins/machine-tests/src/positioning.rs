@@ -171,6 +171,7 @@ impl PointSeparator for Positioning {
             ),
             tables: vec![self.rows(&approaches, &cells)?],
             values: values.into_iter().map(|value| value.of(&self.0.axis)).collect(),
+            checks: approaches.alike(&noise, target.unit),
             remarks: remarks(&approaches, &noise, &terms),
             ..Outcome::default()
         })

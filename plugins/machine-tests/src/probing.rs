@@ -120,7 +120,8 @@ impl PointSeparator for Probing {
             ];
         }
         let place = |(name, _): &(&'static str, &'static str)| {
-            PointColumn::needed(name, Number, "mm", "place of the stylus tip at the touch").measured()
+            // A coordinate along a circle of latitude is the same at each touch.
+            PointColumn::needed(name, Number, "mm", "place of the stylus tip at the touch")
         };
         let mut columns: Vec<PointColumn> = self.axes().iter().map(place).collect();
         columns.push(PointColumn::optional("repeat", Number, "", "number of the set of touches; without it one set"));

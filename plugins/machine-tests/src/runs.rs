@@ -1,6 +1,14 @@
 //! Approaches of target positions: which target, from which side, in which run.
 
-use runout_core::{Error, ErrorKind, Result, numerics::statistics::median, points::Points};
+use runout_core::{
+    Error, ErrorKind, Result,
+    consistency::{
+        Check,
+        groups::{Group, Level, alike},
+    },
+    numerics::statistics::median,
+    points::Points,
+};
 
 /// Two targets are one where they differ by less than this share of the travel: commands are written with few digits.
 const SAME_TARGET: f64 = 1e-7;
@@ -17,6 +25,8 @@ pub(crate) struct Approaches {
 
 /// A single approach lies off the others of its target by so many standard deviations of all approaches, without the largest.
 const OUTLIER: f64 = 12.0;
+/// Parts of the travel whose scatter is compared.
+const PARTS: usize = 4;
 
 impl Approaches {
     /// Approaches that are not like the others of their target, in words.
@@ -136,6 +146,23 @@ impl Approaches {
         let count = along.len() as f64;
         let usual = if count > 2.0 { -(2.0 - 4.0 / count) / (count - 2.0) } else { 0.0 };
         if squares > 0.0 { products / squares - usual } else { 0.0 }
+    }
+
+    /// Whether approaches scatter alike in all parts of the travel, beside what a whole run is off by: their mean scatter decides how well
+    /// each value is known.
+    pub(crate) fn alike(&self, noise: &Noise, unit: &str) -> Vec<Check> {
+        let each = self.targets.len().div_ceil(PARTS);
+        let group = |(targets, deviations): (&[f64], &[Vec<Vec<f64>>])| {
+            let of_side = |runs: &Vec<f64>| {
+                let mean = mean(&runs[..noise.runs]);
+                runs.iter().zip(&noise.course).map(|(one, level)| (one - mean - level).powi(2)).sum::<f64>()
+            };
+            let freedom = (deviations.iter().flatten().count() * (noise.runs - 1)) as f64;
+            let name = format!("the travel from {} to {} {unit}", targets[0], targets[targets.len() - 1]);
+            Group { name, squares: deviations.iter().flatten().map(of_side).sum(), freedom }
+        };
+        let parts = self.targets.chunks(each).zip(self.deviations.chunks(each));
+        alike("parts", &parts.map(group).collect::<Vec<Group>>(), Level::Others, "its approaches are copies")
     }
 
     /// What changes from run to run.

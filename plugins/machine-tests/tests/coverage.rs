@@ -165,3 +165,34 @@ fn intervals_of_circles_hold_the_truth() {
     println!("all: {:.1} %", 100.0 * kept / all);
     assert!(kept >= 0.93 * all, "{kept} of {all}");
 }
+
+/// Repeatability is one number for the whole travel: where approaches scatter more at one end, the data contradict it.
+#[test]
+fn scatter_that_grows_along_the_travel_is_said() {
+    let mut chance = Chance(ChaCha8Rng::seed_from_u64(23));
+    let targets_mm: Vec<f64> = (0..11).map(|target| 50.0 * f64::from(target)).collect();
+    let axis = Axis { noise_um: 0.0, of_run_um: 0.3, backlash_um: 1.0 };
+    let mut said = |grows: f64| {
+        let mut one = || {
+            let mut columns = [("target_mm", Vec::new()), ("deviation_um", Vec::new()), ("direction", Vec::new())];
+            for _ in 0..5 {
+                let off = axis.of_run_um * chance.normal();
+                for side in [1.0, -1.0] {
+                    for target in &targets_mm {
+                        let noise_um = 0.3 * (1.0 + grows * target / 500.0);
+                        columns[0].1.push(*target);
+                        columns[1].1.push(axis.mean_um(*target, side) + off + noise_um * chance.normal());
+                        columns[2].1.push(side);
+                    }
+                }
+            }
+            let config = PositioningConfig { axis: "X".into(), rotary: false, scale_std_ppm: 0.0 };
+            let context = Context { folder: std::path::Path::new("."), rig: None };
+            outcome(config.check(&context).unwrap(), &columns).checks.iter().any(|check| !check.finding.is_empty())
+        };
+        (0..60).filter(|_| one()).count()
+    };
+    let (sound, grown) = (said(0.0), said(4.0));
+    println!("said of 60: sound {sound}, growing to five times {grown}");
+    assert!(sound <= 3 && grown >= 50, "{sound} {grown}");
+}

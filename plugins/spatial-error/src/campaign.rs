@@ -146,9 +146,9 @@ impl Campaign {
             (None, None) => repeats.as_ref().map_or(Noise::Unknown, |repeats| repeats.noise(&measured)),
         };
         let mut correlated = [None; 3];
-        let shown = repeats.filter(|_| noise != Noise::Unknown);
-        for (field, axis) in measured.iter().enumerate() {
-            correlated[*axis] = shown.as_ref().and_then(|repeats| repeats.correlated(field, &time));
+        let in_time = repeats.filter(|_| noise != Noise::Unknown).map(|repeats| repeats.correlated(&time));
+        for (axis, found) in measured.iter().zip(in_time.unwrap_or_default()) {
+            correlated[*axis] = found;
             if let (Some(found), Noise::Repeats { std_um, .. }) = (&correlated[*axis], &mut noise) {
                 std_um[*axis] = found.independent.sqrt();
             }

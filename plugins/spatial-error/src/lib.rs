@@ -7,6 +7,7 @@
 mod campaign;
 mod checks;
 mod compensate;
+mod compensated;
 mod conclusion;
 mod config;
 mod correlation;

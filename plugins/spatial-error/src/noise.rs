@@ -34,12 +34,16 @@ const STEPS: usize = 200;
 const STEP_CHANCE: f64 = 1e-6;
 /// Scatter below this share of the deviations is that of copied rows.
 const COPIED: f64 = 1e-9;
+/// Scatter below this share of the deviations is rounding: it shows nothing of time.
+const ROUNDED: f64 = 1e-5;
 
 /// Readings of places that were read more than once: what they differ by within a place, after a drift and a step that are common to all.
 pub(crate) struct Repeats {
     /// Readings of each place.
     members: Vec<Vec<usize>>,
-    /// What is left of each measured component, place by place.
+    /// Each measured component less its mean at the place, place by place.
+    within: Vec<DVector<f64>>,
+    /// The same less drift and step.
     left: Vec<DVector<f64>>,
     /// Drift and step, orthonormal.
     basis: Vec<DVector<f64>>,
@@ -96,7 +100,7 @@ impl Repeats {
         basis.extend(step(&left_of(&basis), &sizes, &times, &basis, free));
         let dof = free.saturating_sub(basis.len());
         let size_um2 = readings_um.iter().flatten().filter(|value| value.is_finite()).map(|value| value * value).sum();
-        (dof >= FEWEST[0]).then(|| Self { left: left_of(&basis), members, basis, dof, size_um2 })
+        (dof >= FEWEST[0]).then(|| Self { within: left_of(&[]), left: left_of(&basis), members, basis, dof, size_um2 })
     }
 
     /// Noise of a reading of the measured components.
@@ -122,9 +126,10 @@ impl Repeats {
         Noise::Repeats { std_um, dof }
     }
 
-    /// Errors of a component, by its place among the measured ones, that depend on each other in time, where they do so beyond chance.
+    /// Errors of the measured components that depend on each other in time: where a drift and a step do not explain those of all components,
+    /// they are part of them.
     #[must_use]
-    pub(crate) fn correlated(&self, field: usize, time: &[f64]) -> Option<InTime> {
+    pub(crate) fn correlated(&self, time: &[f64]) -> Vec<Option<InTime>> {
         let mut next = 0;
         let place = |readings: &Vec<usize>| {
             next += readings.len();
@@ -133,7 +138,14 @@ impl Repeats {
         let places: Vec<Vec<usize>> = self.members.iter().map(place).collect();
         let times: Vec<f64> = self.members.iter().flatten().map(|row| time[*row]).collect();
         let columns: Vec<Vec<f64>> = self.basis.iter().map(|column| column.as_slice().to_vec()).collect();
-        InTime::of(&places, &times, self.left[field].as_slice(), &columns)
+        let of = |left: &DVector<f64>, columns: &[Vec<f64>]| {
+            let is_rounding = left.norm_squared() <= ROUNDED * ROUNDED * self.size_um2;
+            if is_rounding { None } else { InTime::of(&places, &times, left.as_slice(), columns) }
+        };
+        if self.left.iter().all(|left| of(left, &columns).is_none()) {
+            return vec![None; self.left.len()];
+        }
+        self.within.iter().map(|within| of(within, &[])).collect()
     }
 }
 

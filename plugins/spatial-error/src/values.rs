@@ -1,6 +1,5 @@
 //! Values of a result: the trend, each component's covariance, and the error before and after compensation.
 
-use nalgebra::DVector;
 use runout_core::{
     consistency::{Check, Test, refuted_by},
     summary::Value,
@@ -16,7 +15,6 @@ use crate::{
     noise::Noise,
     solve::Solution,
     terms::Term,
-    whole::{Whole, root_mean_square},
 };
 
 impl Conclusion<'_> {
@@ -115,56 +113,6 @@ fn of_left_out(axis: usize, left_out: &[[LeftOut; 3]]) -> [Value; 2] {
         value("left_out_rms", rms, "um", "root mean square of what the other places do not predict"),
         value("left_out_chi2", chi2, "", "mean square of the same in its standard deviations"),
     ]
-}
-
-/// Places of the query at most that the uncertainty of an error's root mean square comes from.
-const TOGETHER: usize = 100;
-
-/// A prediction, and what remains of it.
-type Known<'a> = (&'a At, [f64; 3]);
-
-impl Conclusion<'_> {
-    /// Error without the placement before and after compensation: expected squares, with the variance of the predictions.
-    fn of_compensation(&self, queries: &[At], factors: [f64; 3]) -> [Value; 2] {
-        let known: Vec<Known> =
-            queries.iter().filter_map(|at| Some((at, at.correction.as_ref()?.remains_um))).collect();
-        let some: Vec<&Known> = known.iter().step_by(known.len().div_ceil(TOGETHER).max(1)).collect();
-        let places: Vec<[f64; 3]> = some.iter().map(|(at, _)| at.place_mm).collect();
-        // Predictions from nearest places have no covariance with each other.
-        let together = (self.solution.neighbours.is_none() && !places.is_empty())
-            .then(|| Whole::new(self.campaign, self.solution, &places, factors));
-        let rms_of = |mean_um: &dyn Fn(&Known) -> [f64; 3]| {
-            let expected = |one: &Known| -> f64 {
-                let each = mean_um(one).into_iter().zip(one.0.predicted);
-                let squares = each.map(|(mean, predicted)| mean * mean + predicted.variance_um2);
-                squares.filter(|square| square.is_finite()).sum()
-            };
-            let rms = (known.iter().map(expected).sum::<f64>() / known.len() as f64).sqrt();
-            let std = together.as_ref().map_or(f64::NAN, |together| {
-                let axes = self.solution.measured.iter();
-                let means = axes.flat_map(|axis| some.iter().map(|one| mean_um(one)[*axis]));
-                let mean = DVector::from_iterator(together.mean_um.len(), means);
-                let [of_some, std] = root_mean_square(&mean, &together.covariance, places.len());
-                if of_some > 0.0 { std * rms / of_some } else { 0.0 }
-            });
-            [rms, std]
-        };
-        let value = |symbol: &str, [number, std]: [f64; 2], about: &str| {
-            Value::new(symbol, number, std, "um", about).not_negative().key()
-        };
-        [
-            value(
-                "error_rms",
-                rms_of(&|(at, _)| at.error_um),
-                "expected root mean square length of the error without the placement, at the places of the query",
-            ),
-            value(
-                "remains_rms",
-                rms_of(&|(_, remains_um)| *remains_um),
-                "the same after the corrections: what axes cannot take away, what is not smooth, and what is not known of the prediction",
-            ),
-        ]
-    }
 }
 
 /// Squareness errors, and the error over the measured volume before and after compensation by the curves.

@@ -64,7 +64,7 @@ fn predictions_hold_beside_a_tracker_that_wanders() {
     }
     let mean = shares.iter().sum::<f64>() / shares.len() as f64;
     eprintln!("held {mean:.3} {shares:.2?}, said {said} of 12, steps or drifts {moved} of 12");
-    assert!(mean > 0.88 && said >= 10 && moved <= 2, "{mean:.3} {shares:.2?} {said} {moved}");
+    assert!(mean > 0.9 && said >= 10 && moved <= 2, "{mean:.3} {shares:.2?} {said} {moved}");
 }
 
 #[test]

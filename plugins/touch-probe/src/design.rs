@@ -16,8 +16,8 @@ use crate::{
 };
 
 /// Singular value, as a share of the largest, below which the touches do not show a combination of parameters: directions are evenly spaced
-/// but for what the stylus is off by, and such a combination would have a thousand times the noise.
-const UNSEEN: f64 = 1e-3;
+/// but for what the stylus is off by, and such a combination would have ten thousand times the noise.
+const UNSEEN: f64 = 1e-4;
 
 /// A parameter of the model.
 #[derive(Debug, Clone, PartialEq)]
