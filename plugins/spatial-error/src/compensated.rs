@@ -83,11 +83,21 @@ impl Conclusion<'_> {
         if self.solution.neighbours.is_some() || places.is_empty() {
             return None;
         }
-        let whole = Whole::new(self.campaign, self.solution, &places, factors);
+        let Whole { covariance, .. } = Whole::new(self.campaign, self.solution, &places, factors);
+        // With the variances of the predictions, which know more of measured places and less of the covariance's parameters.
+        let axes = self.solution.measured.iter();
+        let variances = axes.flat_map(|axis| known.iter().map(|(at, _)| at.predicted[*axis].variance_um2));
+        let wider: Vec<f64> = variances
+            .enumerate()
+            .map(|(row, variance)| (variance / covariance[(row, row)].max(f64::MIN_POSITIVE)).sqrt())
+            .collect();
+        let covariance = Mat::from_fn(wider.len(), wider.len(), |row, column| {
+            wider[row] * wider[column] * covariance[(row, column)]
+        });
         let columns = placement.columns();
-        let basis = Mat::from_fn(whole.mean_um.len(), columns.len(), |row, column| columns[column][row]);
+        let basis = Mat::from_fn(wider.len(), columns.len(), |row, column| columns[column][row]);
         let outside = |all: &Mat<f64>| all - &basis * (basis.transpose() * all);
-        let half = outside(&whole.covariance);
+        let half = outside(&covariance);
         Some(outside(&half.transpose().to_owned()))
     }
 }

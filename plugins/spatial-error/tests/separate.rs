@@ -35,14 +35,14 @@ fn a_grid_is_predicted_and_compensated() {
     let of_compensation = table(&outcome, "compensation");
     let add = column(&of_compensation, "correct_x_um");
     assert!(add.iter().all(|add| add.abs() < 40.0), "{add:?}");
-    // What remains is what is not known of the predictions.
+    // What remains is what is not known of the predictions, less the placement that fits best.
     let mut squares = 0.0;
     for name in ["dx_um", "dy_um", "dz_um"] {
         assert!(column(&of_compensation, &format!("remains_{name}")).iter().all(|left| left.abs() < 0.5), "{name}");
         squares += column(&rows, &format!("std_{name}")).iter().map(|std| std * std).sum::<f64>();
     }
     let [remains, error] = ["remains_rms", "error_rms"].map(|name| value(&outcome, name, None).value);
-    assert!((0.99..1.1).contains(&(remains / (squares / rows.num_rows() as f64).sqrt())), "{remains}");
+    assert!((0.85..1.1).contains(&(remains / (squares / rows.num_rows() as f64).sqrt())), "{remains}");
     assert!(error > 2.0 * remains, "{error} {remains}");
     for name in ["dx", "dy", "dz"] {
         let chi2 = value(&outcome, "left_out_chi2", Some(name)).value;

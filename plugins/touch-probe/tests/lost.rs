@@ -95,7 +95,8 @@ fn the_compensation_is_to_be_added() {
     assert!((mean - 25.0).abs() < 5e-5, "{mean}");
     // Order 1 of lobing stays: it is centring.
     let [before, after] = [&touched.place_mm, &corrected].map(|places| support::range(&support::about_circle(places)));
-    assert!(before > 10.0 && after < 0.5, "{before} {after}");
+    // An order without evidence beside touches that are unlike the others is not compensated.
+    assert!(before > 10.0 && after < 0.6, "{before} {after}");
 }
 
 fn with(points: &Points, name: &str, change: impl Fn(f64) -> f64) -> Points {
