@@ -1,6 +1,6 @@
 //! From a fit to lobes, rows of tables and values.
 
-use std::f64::consts::TAU;
+use std::{collections::HashSet, f64::consts::TAU};
 
 use runout_core::{
     Complex64, Result,
@@ -296,7 +296,11 @@ impl Found<'_> {
         if lobing[1..] != *declared_lobing || form[1..] != declared[..] {
             remarks.push(lost_orders(&listed(&lobing), &listed(&form)));
         }
-        let directions = self.touches.all.iter().map(|touch| touch.direction + 1).max().unwrap_or(0);
+        let directions = self.touches.setups.iter().map(|setup| {
+            let of_setup = self.touches.all.iter().filter(|touch| touch.setup == *setup);
+            of_setup.map(|touch| touch.direction).collect::<HashSet<usize>>().len()
+        });
+        let directions = directions.max().unwrap_or(0);
         let needed = 2 * self.config.max_order + 1;
         if directions < needed {
             remarks.push(format!(

@@ -153,3 +153,16 @@ fn points_that_are_not_what_they_should_be() {
     let stated = stated.separator().unwrap().separate(&points).unwrap();
     assert!(stated.remarks.iter().any(|remark| remark.contains("it may be in mm")));
 }
+
+/// 24 even directions do not determine 15 orders: those that they do not are lost, and the others keep their uncertainty.
+#[test]
+fn orders_that_the_directions_do_not_determine_are_lost() {
+    let mut scenario = scenario(8, &setups(&[(0.0, 0.0), (100.0, 0.0), (217.0, 0.0)]));
+    scenario.directions = 24;
+    let outcome = config(&scenario, 15, None).separate(&scenario.touched().points()).unwrap();
+    let said = outcome.remarks.iter().any(|remark| remark.starts_with("24 directions determine orders up to 11"));
+    assert!(said, "{:?}", outcome.remarks);
+    let mean = value(&outcome, "pretravel_mean");
+    assert!(mean.std().unwrap() < 1.0, "{mean:?}");
+    assert!(value(&outcome, "lobe_14_amplitude").value.is_nan());
+}
