@@ -28,7 +28,7 @@ fn wander(made: &mut Simulated, std_um: f64, readings: f64, seed: u64) {
     }
 }
 
-/// Share of predictions within 1.96 of their standard uncertainties, and the largest share of a campaign that is outside.
+/// Share of predictions within 1.96 of their standard uncertainties.
 fn held(made: &Simulated) -> f64 {
     let outcome = separator("query = { grid_mm = [150.0, 130.0, 110.0] }").separate(&made.points()).unwrap();
     let rows = table(&outcome, "prediction");

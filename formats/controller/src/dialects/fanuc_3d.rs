@@ -13,7 +13,7 @@ use crate::{
     config::{ControllerConfig, Moves},
 };
 
-/// Largest value at a vertex.
+/// Largest value at a vertex; no public text was found that says it.
 const LARGEST: u32 = 127;
 
 pub(super) struct Fanuc3d(pub ControllerConfig);

@@ -1,9 +1,9 @@
 //! FANUC: stored pitch error compensation, parameters 3620 to 3625.
 //!
-//! Parameter manual Series 0i-PB (B-63980EN), pages 99 and 100: a value belongs to the section before its point and counts from the one before; the points
-//! are numbered from that of the reference position on (3620), linear axes from 3621 to 3622 with −7 to 7 times the magnification (3623) in detection
-//! units; a rotary axis comes back to 0 over its turn, and the point of the reference position has the value of the last one. Parameter manual Series
-//! 15i (B-63330EN), page 25: a file begins and ends with `%`, lines are `N… P…`; pitch error data have the number of the point and 10000.
+//! Parameter manual Series 0i-PB (B-63980EN), page 100: values count from point to point; the points are numbered from that of the reference
+//! position on (3620), linear axes from 3621 to 3622 with −7 to 7 times the magnification (3623) in detection units; a rotary axis comes back to 0 over its turn, and the point of the reference position has the value of the last one. Parameter manual Series
+//! 15i (B-63330EN), page 25: a file begins and ends with `%`, lines are `N… P…`. Not found in a public text: that a value belongs to the section before
+//! its point, that pitch error data have the number of the point and 10000, and the limit of 1024 points.
 
 use super::{Comments, Dialect, Written, few_enough, is_positioning, is_turn, name, positions};
 use crate::{
