@@ -22,6 +22,7 @@ pub fn registry() -> Registry {
         runout_machine_tests::register,
         runout_rotor::register,
         runout_spatial_error::register,
+        runout_flatness::register,
         runout_fly_cutting::register,
         runout_as_measured::register,
         runout_external::register,

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use runout_core::pipeline::document::Sources;
-use runout_external::{Check, Conformance, Found};
+use runout_external::{Check, CheckResult, Conformance};
 use serde::Serialize;
 use serde_json::Map;
 
@@ -49,9 +49,9 @@ pub(super) fn execute(command: &[String], rig: Option<&Path>, json: bool) -> Res
 
 fn line(Check { name, found }: Check) -> Line {
     let (found, because) = match found {
-        Found::Holds => ("holds", None),
-        Found::NotTested(because) => ("not-tested", Some(because)),
-        Found::Fails(because) => ("fails", Some(because)),
+        CheckResult::Holds => ("holds", None),
+        CheckResult::NotTested(because) => ("not-tested", Some(because)),
+        CheckResult::Fails(because) => ("fails", Some(because)),
     };
     Line { check: name, found, because }
 }

@@ -15,16 +15,14 @@ pub(crate) const REFUTED: &str = " !";
 pub(crate) const OUTSIDE: &str = " ^";
 /// Digits of a number without a standard uncertainty.
 const DIGITS: usize = 4;
-/// Contradictions that are named; all are in the files.
-const MOST_CONTRADICTIONS: usize = 3;
 
 /// Verdict, loop and key values.
 pub(crate) fn section(page: &mut Page, answer: &Answer) {
     page.line(&answer.verdict.sentence);
-    for reason in answer.contradictions.iter().take(MOST_CONTRADICTIONS) {
+    let (named, more) = answer.named_contradictions();
+    for reason in named {
         page.line(format_args!("  ! {reason}"));
     }
-    let more = answer.contradictions.len().saturating_sub(MOST_CONTRADICTIONS);
     if more > 0 {
         page.line(format_args!("  ! and {more} more: every one is listed with --json"));
     }

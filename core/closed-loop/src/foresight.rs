@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{
-    Bias, Effect, Fit, Model, Outcome, Remainder, Setting,
+    Bias, Effect, Fit, LookedAt, Model, Remainder, Setting,
     diagnosis::{BiasPerUnit, Blind},
     fit::INDEPENDENT,
     report::{VISIBLE, blind},
@@ -172,7 +172,7 @@ impl<F: Fit> Fit for Kept<F> {
         self.fit.bias(effect)
     }
 
-    fn values(&self) -> Vec<Outcome> {
+    fn values(&self) -> Vec<LookedAt> {
         self.fit.values()
     }
 }

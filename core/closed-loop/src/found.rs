@@ -4,7 +4,7 @@ use super::{Remainder, evidence::Evidence, fit::Refit};
 
 /// An effect that was added, with everything that it cannot be distinguished from.
 #[derive(Clone)]
-pub(super) struct Found {
+pub(super) struct FoundEffect {
     /// The best one first.
     pub members: Vec<usize>,
     /// Values of each member as if it were all of it.
@@ -22,7 +22,7 @@ pub(super) enum Declaration<F> {
     /// Nothing that the data prove.
     Sound,
     /// Less than this effect explains, which therefore comes first.
-    Beside(Box<Found>),
+    Beside(Box<FoundEffect>),
     /// Mistakes; the fit with them corrected.
     Corrected(Refit<F>),
 }

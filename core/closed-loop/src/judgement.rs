@@ -6,7 +6,7 @@ use super::{
     diagnosis::Refused,
     evidence::Evidence,
     fit::{INDEPENDENT, Refit},
-    found::Found,
+    found::FoundEffect,
 };
 use runout_consistency::{Check, Test};
 use runout_numerics::least_squares::{dot, norm, orthonormal};
@@ -68,7 +68,7 @@ pub(super) fn same_finding<M: Model>(model: &M, one: usize, other: usize) -> boo
 }
 
 /// χ² per degree of freedom above what noise leaves, up to which an effect is believed though something stays unexplained.
-pub(super) fn may_leave<M: Model>(model: &M, found: &Found) -> f64 {
+pub(super) fn may_leave<M: Model>(model: &M, found: &FoundEffect) -> f64 {
     let unusual = model.size(found.members[0], &found.values).max(UNUSUAL) / UNUSUAL;
     (1.0 - OWN_SHARE) / (unusual * unusual) * excess(&found.before)
 }

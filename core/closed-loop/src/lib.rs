@@ -212,7 +212,7 @@ pub trait Fit {
     }
 
     /// Values that people look at, with their standard uncertainty where it is known.
-    fn values(&self) -> Vec<Outcome>;
+    fn values(&self) -> Vec<LookedAt>;
 
     /// Takes into its results' uncertainty what is not known of the parameters of these effects, one after the other:
     /// their covariance `[parameter][parameter]`.
@@ -346,7 +346,7 @@ pub struct Bias {
 
 /// A value that people look at.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Outcome {
+pub struct LookedAt {
     /// Its symbol or name.
     pub value: String,
     /// The section, where it has one.

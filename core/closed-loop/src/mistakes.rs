@@ -4,7 +4,7 @@ use super::{
     Fit, Model, Remainder, Setting,
     evidence::Evidence,
     fit::Refit,
-    found::{Declaration, Found},
+    found::{Declaration, FoundEffect},
     judgement::{same_finding, worse},
     search::Tracing,
 };
@@ -54,7 +54,7 @@ impl<M: Model> Tracing<'_, M> {
             // What is refused beside a wrong declaration says nothing.
             let refused = self.refused.clone();
             let effect = self.next(current);
-            let goes_farther = |effect: &Found| effect.after.chi2_per_dof() <= after.chi2_per_dof();
+            let goes_farther = |effect: &FoundEffect| effect.after.chi2_per_dof() <= after.chi2_per_dof();
             if let Some(effect) = effect.filter(goes_farther) {
                 return Ok(Declaration::Beside(Box::new(effect)));
             }
@@ -75,7 +75,7 @@ impl<M: Model> Tracing<'_, M> {
             let instead = tried.iter().filter(|(set, left)| others(set) && (alike(left) || copy(set)));
             let instead = instead.filter_map(|(set, _)| set.iter().find(|other| !mistakes.contains(other)).copied());
             let members: Vec<usize> = std::iter::once(*mistake).chain(instead).collect();
-            self.found.push(Found {
+            self.found.push(FoundEffect {
                 alone: vec![Vec::new(); members.len()],
                 members,
                 values: Vec::new(),

@@ -1,6 +1,6 @@
 //! Effects of the whole that differ from part to part: the same everywhere, or each part its own, as the data say.
 
-use super::{Model, Setting, fit::Refit, found::Found, search::Tracing};
+use super::{Model, Setting, fit::Refit, found::FoundEffect, search::Tracing};
 
 /// A part's own effect is there where a parameter is this many standard deviations long.
 const SIGNIFICANT: f64 = 4.0;
@@ -30,7 +30,7 @@ impl<M: Model> Tracing<'_, M> {
                     None => start.push(Setting { effect: part, values: values.clone() }),
                 }
                 if self.found.iter().all(|found| found.members[0] != part) {
-                    self.found.push(Found { members: vec![part], alone: vec![values.clone()], ..whole.clone() });
+                    self.found.push(FoundEffect { members: vec![part], alone: vec![values.clone()], ..whole.clone() });
                 }
             }
             // With all parts there, none stands for another.

@@ -3,7 +3,7 @@
 use super::{
     Effect, Fit, Model, Remainder, Setting,
     diagnosis::{Added, BiasPerUnit, Blind, Estimated, Level, Moved, Step, Verdict},
-    found::Found,
+    found::FoundEffect,
     judgement::noise_only,
 };
 use runout_consistency::Check;
@@ -43,7 +43,7 @@ pub(super) fn level(remainder: &Remainder, held_out: &Remainder) -> Level {
     }
 }
 
-pub(super) fn added<M: Model>(found: &Found, model: &M, fit: &M::Fit, applied: &[Setting]) -> Added {
+pub(super) fn added<M: Model>(found: &FoundEffect, model: &M, fit: &M::Fit, applied: &[Setting]) -> Added {
     let effects = model.effects();
     let named = &effects[found.members[0]];
     let confounded = found.members.len() > 1;

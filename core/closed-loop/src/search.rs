@@ -9,7 +9,7 @@ use super::{
     diagnosis::{Diagnosis, Refused, Unexplained},
     evidence::Evidence,
     fit::{INDEPENDENT, Refit, refit},
-    found::{Declaration, Found},
+    found::{Declaration, FoundEffect},
     judgement::{
         OVERLAP, above_chance, at_the_floor, independent, is, mixed, no_gain, noise_only, overlap, raises_held_out,
         too_little, unit,
@@ -150,7 +150,7 @@ pub fn diagnose<M: Model>(model: &M, settings: &Settings) -> Result<Closed<M::Fi
 pub(super) struct Tracing<'a, M> {
     pub model: &'a M,
     pub settings: &'a Settings,
-    pub found: Vec<Found>,
+    pub found: Vec<FoundEffect>,
     pub refused: Vec<Refused>,
 }
 
@@ -191,7 +191,7 @@ impl<M: Model> Tracing<'_, M> {
     }
 
     /// The effect of the lowest rank that the evidence supports, if any.
-    pub(super) fn next(&mut self, current: &Refit<M::Fit>) -> Option<Found> {
+    pub(super) fn next(&mut self, current: &Refit<M::Fit>) -> Option<FoundEffect> {
         let candidates: Vec<usize> = self.considered().into_iter().filter(|effect| !self.active(*effect)).collect();
         let mut ranks: Vec<usize> = candidates.iter().map(|effect| self.model.rank(*effect)).collect();
         ranks.sort_unstable();
@@ -207,7 +207,7 @@ impl<M: Model> Tracing<'_, M> {
     }
 
     /// The effect with the strongest evidence, if it is sufficient among `count` candidates.
-    fn best(&mut self, current: &Refit<M::Fit>, candidates: &[usize], count: usize) -> Option<Found> {
+    fn best(&mut self, current: &Refit<M::Fit>, candidates: &[usize], count: usize) -> Option<FoundEffect> {
         let before = current.fit.remainder().clone();
         let fixed = self.settings.known.len();
         let active: Vec<Vec<f64>> =
@@ -294,7 +294,7 @@ impl<M: Model> Tracing<'_, M> {
             members.push(other);
             alone.push(refit.settings.last().map(|setting| setting.values.clone()).unwrap_or_default());
         }
-        Some(Found { members, alone, values, std, evidence, before, after })
+        Some(FoundEffect { members, alone, values, std, evidence, before, after })
     }
 
     /// What an effect takes away: the direction in which its fit changed the residual, and its signature where it has more parameters. Of an
@@ -337,7 +337,7 @@ impl<M: Model> Tracing<'_, M> {
 
     /// Limits that ended the search while the data may contain more.
     fn ended_by_limits(&self) -> Vec<String> {
-        let of_lists = |found: &Found| {
+        let of_lists = |found: &FoundEffect| {
             let effect = found.members[0];
             let limit = self.model.last_of_list(effect)?;
             Some(format!(

@@ -3,7 +3,7 @@
 use super::{
     Fit, Model, Remainder,
     fit::{Refit, refit},
-    found::Found,
+    found::FoundEffect,
     judgement::{BIC_LIMIT, P_LIMIT, excess, may_leave, unit},
     search::Tracing,
 };
@@ -51,8 +51,9 @@ impl<M: Model> Tracing<'_, M> {
     }
 
     /// Takes back the others. Says whether there were any.
-    fn keep(&mut self, is_kept: impl Fn(&Found) -> bool) -> bool {
-        let (kept, dropped): (Vec<Found>, Vec<Found>) = std::mem::take(&mut self.found).into_iter().partition(is_kept);
+    fn keep(&mut self, is_kept: impl Fn(&FoundEffect) -> bool) -> bool {
+        let (kept, dropped): (Vec<FoundEffect>, Vec<FoundEffect>) =
+            std::mem::take(&mut self.found).into_iter().partition(is_kept);
         for found in &dropped {
             let reason = format!(
                 "it takes away a part only (χ² per degree of freedom {:.2} → {:.2}, not below {:.2}) of something that stays \
@@ -69,6 +70,6 @@ impl<M: Model> Tracing<'_, M> {
 }
 
 /// Whether other data show it: then it is no part of what stays unexplained.
-fn seen_besides<M: Model>(model: &M, found: &Found) -> bool {
+fn seen_besides<M: Model>(model: &M, found: &FoundEffect) -> bool {
     model.is_seen_besides(found.members[0])
 }

@@ -4,13 +4,14 @@
 //! from turn to turn. Four things are looked for that are none: a phase or a size that all orders share and that runs or
 //! steps ([`common`]); one order that changes slowly, beyond all that asynchronous motion does at any other frequency
 //! beside it ([`alone`]); an order 1 that only a steady turning against the mark makes coherent, and marks that come once in several turns or
-//! several times a turn ([`marks`]). Asynchronous motion is made of lines, not of Gaussian noise: F tests of slow against fast turns find
+//! several times a turn ([`marks`]); and single turns unlike the others ([`single`]). Asynchronous motion is made of lines, not of Gaussian noise: F tests of slow against fast turns find
 //! something in every second sound recording, so a slow course is ranked against all other windows of the spectrum instead.
 
 mod alone;
 mod common;
 mod marks;
 mod parts;
+mod single;
 mod spectrum;
 mod start;
 #[cfg(test)]
@@ -46,7 +47,7 @@ pub struct TurnTable {
 
 /// What the turns of a recording say of themselves, and what the mean is uncertain by.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Course {
+pub struct TurnCourse {
     /// The tests.
     pub checks: Vec<Check>,
     /// Standard deviation of a phase that all orders share, in rad of order 1: order n has n times as much. 0 where none changes.
@@ -86,7 +87,7 @@ impl PhaseCourse {
     }
 }
 
-impl Course {
+impl TurnCourse {
     /// What the course adds to the covariance of an order's mean, `[channel][channel]`; `None` where nothing.
     ///
     /// The value of any turn was as likely asked for as that of any other: the mean square of the course, which is
@@ -105,7 +106,7 @@ impl Course {
     }
 }
 
-impl Course {
+impl TurnCourse {
     /// That of some of the channels.
     #[must_use]
     pub fn of_channels(&self, channels: &[usize], all: usize) -> Self {
@@ -126,8 +127,8 @@ impl Course {
 impl TurnTable {
     /// Tests the turns against each other. Nothing with too few of them.
     #[must_use]
-    pub fn course(&self) -> Course {
-        let mut course = Course::default();
+    pub fn course(&self) -> TurnCourse {
+        let mut course = TurnCourse::default();
         if self.rows() < FEWEST_ROWS || self.channels == 0 || self.orders == 0 {
             return course;
         }
@@ -136,6 +137,7 @@ impl TurnTable {
         marks::look(&steady, &spectrum, &mut course);
         common::look(&steady, &mut course);
         alone::look(&steady, &spectrum, &mut course);
+        single::look(&steady, &mut course);
         course
     }
 

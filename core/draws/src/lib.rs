@@ -9,18 +9,22 @@
 //!
 //! No value and no standard is known here: a value is a function of a draw ([`Profiles::values`]).
 
+mod again;
 mod angles;
 mod errors;
 mod interval;
 mod marks;
+mod open;
 mod profiles;
 mod section;
 mod spectrum;
 mod uncertainty;
 
+pub use again::{Draw, Truth, measured_again, without_noise};
 pub use angles::{angles_for_parabolas, crest_order, drawn_angles};
 pub use errors::{DrawnErrors, Errors};
 pub use interval::Interval;
+pub use open::OpenErrors;
 pub use profiles::{Draws, KINDS, Profiles, Source};
 pub use section::Measured;
 pub use uncertainty::*;

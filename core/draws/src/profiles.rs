@@ -153,7 +153,7 @@ impl Draws {
 }
 
 /// A factor on noise, as wide as its variance is badly known from so many squares: one chance for all orders and sections that share it.
-fn wider(squares: usize, chance: Option<&ChiSquared<f64>>, random: &mut ChaCha8Rng) -> f64 {
+pub(crate) fn wider(squares: usize, chance: Option<&ChiSquared<f64>>, random: &mut ChaCha8Rng) -> f64 {
     let Some(chance) = chance else { return 1.0 };
     let squares = squares as f64;
     // Weights by 1/variance² favour orders whose variance was found too small by as much again.

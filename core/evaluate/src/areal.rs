@@ -3,8 +3,8 @@
 use std::{borrow::Cow, collections::BTreeSet};
 
 use super::{
-    ArealFilter, Content, Evaluate, Filter, FormRemoval, Found, Group, Label, PartSummary, labelled,
-    section_gaps::SectionGaps, texture::found,
+    ArealFilter, Content, Evaluate, Filter, FormRemoval, Group, Label, NumberFound, PartSummary, labelled,
+    section_gaps::SectionGaps,
 };
 use crate::Value;
 use runout_draws::seed;
@@ -78,7 +78,7 @@ pub fn add_areal(
     };
     let used = sections.iter().map(|section| section.used).sum::<f64>() / sections.len().max(1) as f64;
     let there = 1.0 - map.missing() as f64 / map.heights_um().len() as f64;
-    let add = |values: &mut Vec<Value>, (labels, numbers): (Vec<Label>, Vec<Found>)| {
+    let add = |values: &mut Vec<Value>, (labels, numbers): (Vec<Label>, Vec<NumberFound>)| {
         let filter = filter(evaluate, surface.radius_mm);
         values.extend(labelled(labels, numbers, &filter, &held, there.min(used)));
     };
@@ -280,7 +280,7 @@ impl<'a> Prepared<'a> {
         Ok([above, below])
     }
 
-    fn areal(&self, map: &HeightMap, parameters: &[areal::Parameter], draws: &Draws) -> (Vec<Label>, Vec<Found>) {
+    fn areal(&self, map: &HeightMap, parameters: &[areal::Parameter], draws: &Draws) -> (Vec<Label>, Vec<NumberFound>) {
         let standard = |clause: &str| format!("ISO 25178-2:2021, {clause}");
         let label = |one: &areal::Parameter| Label::new(one.symbol, one.unit, standard(one.clause), self.reference());
         let mut labels: Vec<Label> = parameters.iter().map(label).collect();
@@ -289,7 +289,7 @@ impl<'a> Prepared<'a> {
             Draws::Made(drawn) => found(Some(drawn), index, value, sensitivity(index)),
             Draws::Unknown => found(None, index, value, sensitivity(index)),
         };
-        let mut numbers: Vec<Found> =
+        let mut numbers: Vec<NumberFound> =
             parameters.iter().enumerate().map(|(index, one)| known(index, one.value)).collect();
         let options = &self.evaluate.areal;
         if !(options.heights_um.is_empty() && options.ratios_percent.is_empty()) {
@@ -310,7 +310,7 @@ impl<'a> Prepared<'a> {
         (labels, numbers)
     }
 
-    fn twist(&self, twist: &Twist) -> (Vec<Label>, Vec<Found>) {
+    fn twist(&self, twist: &Twist) -> (Vec<Label>, Vec<NumberFound>) {
         let labels = twist::PARAMETERS.iter().map(|(symbol, unit, meaning)| {
             Label::new(symbol, unit, format!("after MBN 31007-07, {meaning}"), self.reference())
         });
@@ -322,8 +322,8 @@ impl<'a> Prepared<'a> {
 const NOT_DRAWN: &str = "no errors are drawn for it";
 
 /// A number without uncertainty.
-fn without(value: f64, why: &str) -> Found {
-    Found { no_uncertainty: Some(why.to_owned()), ..Found::of(value, None) }
+fn without(value: f64, why: &str) -> NumberFound {
+    NumberFound { no_uncertainty: Some(why.to_owned()), ..NumberFound::of(value, None) }
 }
 
 /// A map without the wavelengths below λs and above λc.
@@ -367,6 +367,19 @@ fn end_rings(step_mm: f64, length_mm: f64, longest_mm: f64) -> usize {
 /// Places of Sq and Std in [`areal::PARAMETERS`].
 const SQ: usize = 0;
 const STD: usize = 9;
+
+/// A number found, with its error as draws give it.
+fn found(
+    drawn: Option<&Drawn>,
+    index: usize,
+    value: f64,
+    sensitivity: std::result::Result<Sensitivity, &str>,
+) -> NumberFound {
+    let Some(drawn) = drawn else { return NumberFound::of(value, None) };
+    let known = sensitivity.map_err(str::to_owned).and_then(|sensitivity| drawn.uncertainty(index, value, sensitivity));
+    let no_uncertainty = known.as_ref().err().cloned();
+    NumberFound { uncertainty: known.ok(), no_uncertainty, ..NumberFound::of(value, None) }
+}
 
 /// How areal values depend on errors, in the order of [`areal::PARAMETERS`]; or why their intervals do not hold.
 fn sensitivity(index: usize) -> std::result::Result<Sensitivity, &'static str> {

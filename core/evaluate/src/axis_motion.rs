@@ -34,7 +34,7 @@ pub(super) fn values(motion: &AxisMotion, evaluate: &Evaluate) -> (Vec<Value>, V
     let errors = motion.errors.as_ref().map_err(String::as_str);
     let errors = errors.and_then(|errors| known(errors, motion.motion.len()));
     let at = At { motion, turn, errors };
-    let mut found = Found::default();
+    let mut found = AxisValues::default();
     let lines = evaluate.directions.iter().flat_map(|line| [Direction::Along(*line), Direction::TiltAlong(*line)]);
     let faces = evaluate.faces.iter().copied().map(Direction::Face);
     for direction in [Direction::X, Direction::Y].into_iter().chain([Direction::TiltX, Direction::TiltY]).chain(lines) {
@@ -107,7 +107,7 @@ impl Turn {
 
 /// Values, and directions without some of what is asked for.
 #[derive(Default)]
-struct Found {
+struct AxisValues {
     values: Vec<Value>,
     /// Directions that are not observable, with the number of positions.
     lost: Vec<(String, usize)>,
@@ -123,7 +123,7 @@ struct At<'a> {
 }
 
 impl At<'_> {
-    fn add(&self, direction: Direction, evaluate: &Evaluate, found: &mut Found) {
+    fn add(&self, direction: Direction, evaluate: &Evaluate, found: &mut AxisValues) {
         let Some(weights) = weights(direction) else { return };
         let harmonics = self.turn.harmonics(|place| sum(&weights, &self.motion.motion[place]));
         let variance = self.variance(&weights);
@@ -189,7 +189,7 @@ impl At<'_> {
         amplitude.is_finite().then(|| found.value(self.motion.z_mm, self.motion.letters))
     }
 
-    fn remarks(&self, found: &Found) -> Vec<String> {
+    fn remarks(&self, found: &AxisValues) -> Vec<String> {
         let (count, highest) = (self.motion.motion.len(), self.turn.highest());
         let mut remarks = Vec::new();
         if !found.values.is_empty() {

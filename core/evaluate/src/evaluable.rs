@@ -1,7 +1,7 @@
 //! What the standards' values can be computed from, as data: a domain offers it, the pipeline turns it into values.
 
 use crate::height_grid::HeightGrid;
-use runout_standards::open_errors::OpenErrors;
+use runout_draws::OpenErrors;
 use runout_turning::separation::Separation;
 
 /// Something that the standards' values are computed from, with its errors and with what it is of.

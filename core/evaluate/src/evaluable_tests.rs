@@ -14,7 +14,7 @@ use crate::{
     evaluable::{Evaluable, EvaluableKind, OpenProfile, PlaneMap},
     height_grid::HeightGrid,
 };
-use runout_standards::open_errors::OpenErrors;
+use runout_draws::OpenErrors;
 
 const POINTS: usize = 180;
 

@@ -11,8 +11,8 @@ use super::{
 };
 use crate::Value;
 use crate::evaluable::{Evaluable, EvaluableKind, OpenProfile};
+use runout_draws::OpenErrors;
 use runout_numerics::Complex64;
-use runout_standards::open_errors::OpenErrors;
 use runout_turning::{
     station::StationResult,
     surface::{SurfaceBuilder, SurfaceConfig},

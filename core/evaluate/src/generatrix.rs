@@ -2,28 +2,13 @@
 
 use std::f64::consts::TAU;
 
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
-use rand_distr::{Distribution, StandardNormal};
-
-use super::{
-    Content, Evaluate, Found, Group, Label, PartSummary, labelled,
-    texture::{found, sensitivity},
-};
+use super::{Content, Evaluate, Group, Label, PartSummary, labelled, open_profile::texture_along};
 use crate::Value;
-use runout_draws::seed;
+use runout_draws::{OpenErrors, seed};
 use runout_numerics::{Complex64, stretches::covered};
-use runout_standards::{
-    drawn::in_pairs,
-    texture::{self, Kind, Settings},
-};
+use runout_standards::texture::{self, Kind, Settings};
 use runout_turning::surface::{Section, Uncertain};
 
-/// Place of Rq in [`texture::PARAMETERS`].
-const RQ: usize = 1;
-/// Pairs of draws: profiles along the axis are few and short, and each is drawn from one seed, so that the standard deviation of few
-/// draws would be off alike in all recordings.
-const PAIRS: usize = 128;
 /// Points that a profile along the axis needs.
 const FEWEST: usize = 7;
 
@@ -69,9 +54,7 @@ pub fn add_generatrices(
 struct Generatrix<'a> {
     z_mm: &'a [f64],
     profile_um: Vec<f64>,
-    without_noise_um: Vec<f64>,
-    /// Of each point's error; NaN where not known.
-    std_um: Vec<f64>,
+    errors: OpenErrors,
     /// Highest order of the sections.
     highest: usize,
     lost: Vec<usize>,
@@ -94,18 +77,13 @@ impl<'a> Generatrix<'a> {
                 profile_um[ring] = f64::NAN;
             }
         }
-        let mut without_noise_um: Vec<f64> = uncertain.harmonics(lowest, true).iter().map(at).collect();
-        for (point, known) in without_noise_um.iter_mut().zip(&profile_um) {
-            *point += 0.0 * known;
-        }
         let mut lost: Vec<usize> = uncertain.sections().iter().flat_map(Section::lost_orders).collect();
         lost.sort_unstable();
         lost.dedup();
         Self {
             z_mm: uncertain.z_mm(),
             profile_um,
-            without_noise_um,
-            std_um: uncertain.std_um(lowest),
+            errors: OpenErrors { std_um: uncertain.std_um(lowest), ..OpenErrors::default() },
             highest: uncertain.sections().iter().map(|section| section.orders.len()).max().unwrap_or(1) - 1,
             lost,
             seed: seed(&["generatrix", &angle_deg.to_string()]),
@@ -125,27 +103,11 @@ impl<'a> Generatrix<'a> {
     fn values(&self, kind: Kind, evaluate: &Evaluate, radius_mm: f64, reference: &str) -> Vec<Value> {
         let Some(filter) = evaluate.profile_filter(kind, radius_mm) else { return Vec::new() };
         let settings = self.settings(kind, evaluate);
-        let look = |profile_um: &[f64]| texture::along(self.z_mm, profile_um, &settings);
-        let measured = look(&self.profile_um);
-        let mut random = ChaCha8Rng::seed_from_u64(self.seed);
-        let next = |errors_um: &mut [f64]| {
-            for (error, std_um) in errors_um.iter_mut().zip(&self.std_um) {
-                let normal: f64 = StandardNormal.sample(&mut random);
-                *error = std_um * normal;
-            }
-        };
-        let known = self.std_um.iter().all(|std_um| std_um.is_finite());
-        let drawn = known.then(|| {
-            in_pairs(&self.without_noise_um, PAIRS, next, |both| both.map(|one| look(one).values().to_vec()))
-                .behind_filter(RQ)
-        });
+        let measured = texture::along(self.z_mm, &self.profile_um, &settings);
         let labels = kind.parameters().iter().map(|(symbol, unit, clause)| {
             Label::new(symbol, unit, format!("ISO 21920-2:2021, {clause}"), reference.to_owned())
         });
-        let values = measured.values();
-        let numbers = values.iter().enumerate();
-        let numbers: Vec<Found> =
-            numbers.map(|(index, value)| found(drawn.as_ref(), index, *value, sensitivity(index))).collect();
+        let numbers = texture_along(self.z_mm, &self.profile_um, Ok(&self.errors), self.seed, &settings);
         let there = self.z_mm.iter().zip(&self.profile_um).filter(|(_, height)| height.is_finite());
         let there: Vec<f64> = there.map(|(z_mm, _)| *z_mm).collect();
         let share = measured.points as f64 / (measured.points + measured.missing).max(1) as f64;

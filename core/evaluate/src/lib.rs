@@ -98,7 +98,7 @@ fn ascii_unit(unit: &str) -> String {
 
 /// A number, and what is known of its error.
 #[derive(Debug, Clone)]
-struct Found {
+struct NumberFound {
     value: f64,
     uncertainty: Option<Uncertainty>,
     /// Why there is none, where the errors are known.
@@ -106,22 +106,32 @@ struct Found {
     raised_by_noise: Option<f64>,
 }
 
-impl Found {
+impl NumberFound {
     /// A number found as `value`, of which draws are known, where errors are.
     fn of(value: f64, known: Option<&Interval>) -> Self {
         let uncertainty = known.and_then(|known| known.at(value));
         Self { value, uncertainty, no_uncertainty: None, raised_by_noise: known.and_then(Interval::raised_by_noise) }
     }
+
+    /// The same without what is known of its error, and why.
+    fn without_uncertainty(self, reason: &str) -> Self {
+        Self { uncertainty: None, no_uncertainty: Some(reason.to_owned()), raised_by_noise: None, ..self }
+    }
+
+    /// Says why nothing is known, where nothing is.
+    fn or_because(self, reason: &str) -> Self {
+        if self.uncertainty.is_some() { self } else { self.without_uncertainty(reason) }
+    }
 }
 
-impl From<(f64, Option<Uncertainty>)> for Found {
+impl From<(f64, Option<Uncertainty>)> for NumberFound {
     fn from((value, uncertainty): (f64, Option<Uncertainty>)) -> Self {
         Self { value, uncertainty, no_uncertainty: None, raised_by_noise: None }
     }
 }
 
 /// Numbers under their labels; what is no number is left out: the profile or the wall does not have that value.
-fn labelled(labels: Vec<Label>, found: Vec<Found>, filter: &Filter, held: &Content, coverage: f64) -> Vec<Value> {
+fn labelled(labels: Vec<Label>, found: Vec<NumberFound>, filter: &Filter, held: &Content, coverage: f64) -> Vec<Value> {
     let lost_orders = filter.lost(&held.lost);
     let weakened_above_upr = held
         .half_power_upr
@@ -129,7 +139,7 @@ fn labelled(labels: Vec<Label>, found: Vec<Found>, filter: &Filter, held: &Conte
     let absent_above_upr = Some(held.all_to).filter(|order| filter.reaches_above(*order));
     let known = labels.into_iter().zip(found).filter(|(_, found)| found.value.is_finite());
     known
-        .map(|(label, Found { value, uncertainty, no_uncertainty, raised_by_noise })| Value {
+        .map(|(label, NumberFound { value, uncertainty, no_uncertainty, raised_by_noise })| Value {
             band_upr: filter.band_upr(held.highest_passed()),
             lost_orders: lost_orders.clone(),
             weakened_above_upr,

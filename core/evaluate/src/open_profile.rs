@@ -1,30 +1,18 @@
 //! Straightness and texture of an open profile.
 
-use super::{
-    Evaluate, Found, Group, Label,
-    texture::{found, sensitivity},
-};
+use super::{Evaluate, Group, Label, NumberFound, texture::no_interval};
 use crate::Value;
 use crate::evaluable::OpenProfile;
-use runout_draws::seed;
+use runout_draws::{OpenErrors, seed};
 use runout_numerics::stretches::covered;
 use runout_standards::{
-    drawn::{Drawn, Sensitivity, share_in_words},
     roundness::Reference,
     straightness::Straightness,
     texture::{self, Kind, Settings},
 };
 
-/// Points that all draws look at together, about: a long profile has fewer draws.
-const POINTS_DRAWN: usize = 2_000_000;
-/// Pairs of draws: a profile is drawn from one seed, so that the standard deviation of few draws would be off alike in all recordings.
-const PAIRS: std::ops::RangeInclusive<usize> = 16..=128;
 /// Points that a profile needs for texture.
 const FEWEST: usize = 7;
-/// Place of Rq in [`texture::PARAMETERS`], and of STRq among the values of straightness.
-const RQ: usize = 1;
-const STRQ: usize = 3;
-
 /// Its values, and what they are not.
 pub(super) fn values(profile: &OpenProfile, evaluate: &Evaluate) -> (Vec<Value>, Vec<String>) {
     let (mut values, mut remarks) = (Vec::new(), Vec::new());
@@ -56,9 +44,9 @@ pub(super) fn values(profile: &OpenProfile, evaluate: &Evaluate) -> (Vec<Value>,
 
 /// STRt about the lines that are asked for; STRp, STRv and STRq about LSLI.
 fn straightness(profile: &OpenProfile, references: &[Reference]) -> Vec<Value> {
-    let look = |deviation_um: &[f64]| {
+    let look = |deviation_um: &[f64], values: &mut Vec<f64>| {
         let found = Straightness::of(&profile.z_mm, deviation_um);
-        vec![found.strt_lsli_um, found.strp_um, found.strv_um, found.strq_um, found.strt_mzli_um]
+        values.extend([found.strt_lsli_um, found.strp_um, found.strv_um, found.strq_um, found.strt_mzli_um]);
     };
     let label = |symbol: &'static str, what: &str, line: &str| {
         Label::new(symbol, "µm", format!("ISO 12780-1:2011, {what} straightness deviation"), line)
@@ -70,17 +58,10 @@ fn straightness(profile: &OpenProfile, references: &[Reference]) -> Vec<Value> {
         (Reference::LeastSquares, label("STRq", "root mean square", "LSLI")),
         (Reference::MinimumZone, label("STRt", "peak-to-valley", "MZLI")),
     ];
-    let measured = look(&profile.deviation_um);
-    let drawn = drawn(profile, "straightness", look);
-    let mut values = Vec::new();
-    for (index, ((reference, label), value)) in all.into_iter().zip(measured).enumerate() {
-        let sensitivity = if index == STRQ { Sensitivity::Mean } else { Sensitivity::Extreme };
-        if references.contains(&reference) {
-            let found = with_reason(&drawn, index, value, Ok(sensitivity));
-            values.extend(labelled(label, found, "none", profile));
-        }
-    }
-    values
+    let errors = profile.errors.as_ref().map_err(String::as_str);
+    let found = found(&profile.deviation_um, errors, seed(&["straightness", &profile.of]), look);
+    let asked = all.into_iter().zip(found).filter(|((reference, _), _)| references.contains(reference));
+    asked.filter_map(|((_, label), found)| labelled(label, found, "none", profile)).collect()
 }
 
 fn length_mm(profile: &OpenProfile) -> f64 {
@@ -103,81 +84,58 @@ fn texture(profile: &OpenProfile, kind: Kind, evaluate: &Evaluate) -> Vec<Value>
     let turn_mm = length_mm(profile);
     let Some(filter) = evaluate.profile_filter(kind, turn_mm / std::f64::consts::TAU) else { return Vec::new() };
     let settings = settings(profile, kind, evaluate);
-    let look = |deviation_um: &[f64]| texture::along(&profile.z_mm, deviation_um, &settings).values().to_vec();
-    let drawn = drawn(profile, kind.material_ratio_symbol(), look).map(|drawn| drawn.behind_filter(RQ));
-    let mut values = Vec::new();
-    for (index, value) in look(&profile.deviation_um).into_iter().enumerate() {
-        let (symbol, unit, clause) = kind.parameters()[index];
-        let label = Label::new(symbol, unit, format!("ISO 21920-2:2021, {clause}"), "mean line");
-        let found = with_reason(&drawn, index, value, sensitivity(index));
-        values.extend(labelled(label, found, &filter.name, profile));
-    }
-    values
+    let seed = seed(&[kind.material_ratio_symbol(), &profile.of]);
+    let errors = profile.errors.as_ref().map_err(String::as_str);
+    let found = texture_along(&profile.z_mm, &profile.deviation_um, errors, seed, &settings);
+    let labels = kind
+        .parameters()
+        .iter()
+        .map(|(symbol, unit, clause)| Label::new(symbol, unit, format!("ISO 21920-2:2021, {clause}"), "mean line"));
+    labels.zip(found).filter_map(|(label, found)| labelled(label, found, &filter.name, profile)).collect()
 }
 
-/// Draws about a profile; or why there are none.
-fn drawn(profile: &OpenProfile, what: &str, look: impl Fn(&[f64]) -> Vec<f64>) -> Result<Drawn, String> {
-    let errors = profile.errors.as_ref().map_err(Clone::clone)?;
-    let points = profile.deviation_um.len();
-    let pairs = (POINTS_DRAWN / (2 * points).max(1)).clamp(*PAIRS.start(), *PAIRS.end());
-    let drawn = errors.drawn(&profile.deviation_um, pairs, seed(&[what, &profile.of]), look);
-    drawn.ok_or_else(|| "its errors are not known at every position".to_owned())
-}
-
-fn with_reason(
-    drawn: &Result<Drawn, String>,
-    index: usize,
-    value: f64,
-    sensitivity: Result<Sensitivity, &str>,
-) -> Found {
-    let reason = match (drawn, sensitivity) {
-        (Ok(drawn), Ok(sensitivity)) if drawn.share() > largest_share(sensitivity) => {
-            share_in_words(drawn.share()) + "; of an open profile no interval has 95 % coverage then"
-        }
-        (Ok(drawn), sensitivity) => {
-            let found = found(Some(drawn), index, value, sensitivity);
-            return if sensitivity == Ok(Sensitivity::Extreme) { with_uncertain_shift(found) } else { found };
-        }
-        (Err(reason), _) => reason.clone(),
+/// Values of texture along a line, in the order of [`texture::PARAMETERS`].
+pub(super) fn texture_along(
+    z_mm: &[f64],
+    profile_um: &[f64],
+    errors: Result<&OpenErrors, &str>,
+    seed: u64,
+    settings: &Settings,
+) -> Vec<NumberFound> {
+    let look = |profile_um: &[f64], values: &mut Vec<f64>| {
+        values.extend(texture::along(z_mm, profile_um, settings).values());
     };
-    Found { no_uncertainty: Some(reason), ..Found::of(value, None) }
+    let found = found(profile_um, errors, seed, look).into_iter().enumerate();
+    let with_reason = |(index, found): (usize, NumberFound)| match no_interval(index).filter(|_| errors.is_ok()) {
+        Some(reason) => found.without_uncertainty(reason),
+        None => found,
+    };
+    found.map(with_reason).collect()
 }
 
-/// An extreme with what is not known of the shift that errors give it: short waves of a line that noise hides decide which point is
-/// the extreme, so that the shift is known no better than to its own size. A shift above the standard uncertainty leaves no interval.
-fn with_uncertain_shift(mut found: Found) -> Found {
-    let Some(known) = &mut found.uncertainty else { return found };
-    let [low, high] = known.interval_95;
-    let middle = 0.5 * (low + high);
-    let shift = found.value - middle;
-    if shift.abs() > known.std {
-        let share = shift.abs() / known.std;
-        found.uncertainty = None;
-        found.no_uncertainty = Some(format!(
-            "errors shift it by {share:.1} standard uncertainties; of an open profile no interval has 95 % coverage then"
-        ));
-        return found;
-    }
-    let std = known.std.hypot(shift);
-    if std > 0.0 {
-        let half = 0.5 * (high - low) * std / known.std;
-        known.interval_95 = [(middle - half).max(0.0), middle + half];
-        known.std = std;
-    }
-    found
+/// Values of a profile, each with what is known of its error, or why nothing is.
+fn found(
+    profile_um: &[f64],
+    errors: Result<&OpenErrors, &str>,
+    seed: u64,
+    look: impl Fn(&[f64], &mut Vec<f64>),
+) -> Vec<NumberFound> {
+    let mut measured = Vec::new();
+    look(profile_um, &mut measured);
+    let known = errors
+        .and_then(|errors| errors.values(profile_um, seed, &look).ok_or("its errors are not known at every position"));
+    let of = |(index, value): (usize, f64)| match &known {
+        Ok(known) => NumberFound::of(value, known.get(index)).or_because(NOT_IN_ALL),
+        Err(reason) => NumberFound::of(value, None).without_uncertainty(reason),
+    };
+    measured.into_iter().enumerate().map(of).collect()
 }
 
-/// Share of the errors in the variance of an open profile above which a value has no interval: a line has fewer places than a turn, which
-/// show less of what is noise. By simulation, `intervals_of_straightness_by_noise` and `intervals_of_open_texture_by_noise`.
-fn largest_share(sensitivity: Sensitivity) -> f64 {
-    match sensitivity {
-        Sensitivity::Mean => 0.05,
-        Sensitivity::Extreme => 0.0005,
-    }
-}
+/// Why a value has no uncertainty though the errors are known.
+const NOT_IN_ALL: &str = "not every profile within the errors has this value";
 
 /// A number under its label; nothing where the profile does not have that value. A line has no undulations per revolution.
-fn labelled(label: Label, found: Found, filter: &str, profile: &OpenProfile) -> Option<Value> {
+fn labelled(label: Label, found: NumberFound, filter: &str, profile: &OpenProfile) -> Option<Value> {
     let there = profile.z_mm.iter().zip(&profile.deviation_um).filter(|(_, value)| value.is_finite());
     let there: Vec<f64> = there.map(|(z_mm, _)| *z_mm).collect();
     let share = there.len() as f64 / profile.deviation_um.len().max(1) as f64;

@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use super::{Filter, Found, Label, POINTS_A_WAVE, labelled, section::Form};
+use super::{Filter, Label, NumberFound, POINTS_A_WAVE, labelled, section::Form};
 use crate::Value;
 use runout_draws::{Interval, KINDS, LARGEST, angles_for_parabolas, crest_order, drawn_angles};
 use runout_numerics::{
@@ -27,7 +27,7 @@ impl Form {
         let drawn = self.drawn_about(filter, references);
         let drawn = drawn.iter().map(Some).chain(std::iter::repeat(None));
         let found = self.about(filter, references).into_iter().zip(drawn);
-        let mut found: Vec<Found> = found.map(|(value, drawn)| Found::of(value, drawn)).collect();
+        let mut found: Vec<NumberFound> = found.map(|(value, drawn)| NumberFound::of(value, drawn)).collect();
         if let Some(last) = labels.iter().position(|label| label.symbol == "RONq") {
             let steepest = "largest |dr/dθ| of the profile, no standard's symbol";
             let reference = Reference::LeastSquares.symbol();

@@ -2,7 +2,7 @@
 
 use std::cell::OnceCell;
 
-use super::{Content, Evaluate, Filter, Found, Group, Label, POINTS_A_WAVE, labelled};
+use super::{Content, Evaluate, Filter, Group, Label, NumberFound, POINTS_A_WAVE, labelled};
 use crate::Value;
 use runout_draws::{Draws, Interval, Measured, Uncertainty, noise_95, seed, stands_out, student_95};
 use runout_numerics::{Complex64, fourier::Fourier};
@@ -227,7 +227,7 @@ impl Form {
         });
         let source = "largest change of the profile over a window, no standard's symbol";
         let label = Label::new("slope", "µm", source, format!("LSCI, window {window_deg}°"));
-        self.labelled(vec![label], vec![Found::of(value, found.as_ref())], filter)
+        self.labelled(vec![label], vec![NumberFound::of(value, found.as_ref())], filter)
     }
 
     /// Amplitude and phase of each order from 2 to at most `highest`.
@@ -255,7 +255,7 @@ impl Form {
                 Label::new("amplitude", "µm", "amplitude of one order of the form", "LSCI"),
                 Label::new("phase", "°", "part's angle of the order's first crest", "LSCI"),
             ];
-            let found = [(amplitude, of_amplitude), (phase, of_phase)].map(Found::from).to_vec();
+            let found = [(amplitude, of_amplitude), (phase, of_phase)].map(NumberFound::from).to_vec();
             let both = self.labelled(labels, found, &Filter::low_pass(None));
             let weakened_above_upr = self.held.half_power_upr.filter(|half| turns > *half);
             let of_order = |value| Value { band_upr: [order; 2], lost_orders: Vec::new(), weakened_above_upr, ..value };
@@ -270,14 +270,14 @@ impl Form {
         filter: &Filter,
         angles: usize,
         mut values: impl FnMut(&[f64], &mut Vec<f64>),
-    ) -> Vec<Found> {
+    ) -> Vec<NumberFound> {
         let known = self.known(|order| filter.weight(order), angles, &mut values);
         if !known.is_empty() {
-            return known.iter().map(|known| Found::of(known.found, Some(known))).collect();
+            return known.iter().map(|known| NumberFound::of(known.found, Some(known))).collect();
         }
         let mut found = Vec::new();
         values(&self.profile(filter, &mut Fourier::new(angles)), &mut found);
-        found.into_iter().map(|value| Found::of(value, None)).collect()
+        found.into_iter().map(|value| NumberFound::of(value, None)).collect()
     }
 
     /// What is known of values of the profile whose orders are weighted, on equal angles; nothing without known errors.
@@ -307,7 +307,7 @@ impl Form {
         form_um
     }
 
-    pub(super) fn labelled(&self, labels: Vec<Label>, found: Vec<Found>, filter: &Filter) -> Vec<Value> {
+    pub(super) fn labelled(&self, labels: Vec<Label>, found: Vec<NumberFound>, filter: &Filter) -> Vec<Value> {
         labelled(labels, found, filter, &self.held, self.at.coverage(self.angles))
     }
 }

@@ -1,6 +1,6 @@
 //! The steepest slope of one section.
 
-use super::{Filter, Found, roundness::angles_to_draw, section::Form};
+use super::{Filter, NumberFound, roundness::angles_to_draw, section::Form};
 use runout_draws::KINDS;
 use runout_numerics::Complex64;
 use runout_standards::{
@@ -13,7 +13,7 @@ const DRAWN_POINTS_A_WAVE: usize = 6;
 
 impl Form {
     /// The steepest slope, µm/°, from the harmonics; its error by draws of slopes.
-    pub(super) fn steepest(&self, filter: &Filter) -> Found {
+    pub(super) fn steepest(&self, filter: &Filter) -> NumberFound {
         let harmonics = filter.harmonics(&self.harmonics);
         let value = steepest_um_per_rad(&harmonics, &self.at.gaps).to_radians();
         let um_per_deg = |order: usize| Complex64::I * (order as f64).to_radians();
@@ -24,7 +24,7 @@ impl Form {
         let waves = filter.highest(self.held.highest).max(2);
         let angles = angles_to_draw(DRAWN_POINTS_A_WAVE, &slopes, &of_errors, waves);
         let weight = |order: usize| filter.weight(order) * um_per_deg(order);
-        let Some(draws) = self.draws() else { return Found::from((value, None)) };
+        let Some(draws) = self.draws() else { return NumberFound::from((value, None)) };
         let profiles = draws.profiles(weight, angles, |_, slopes| self.at.gaps.blank(slopes));
         let heights: Vec<Heights> = (0..KINDS).map(|kind| Heights::new(&profiles.undisturbed_um(kind)[0])).collect();
         let mut sum = Sum::default();
@@ -33,6 +33,6 @@ impl Form {
             let ([low, high], _) = noise.map_or_else(|| slopes.undisturbed(), |noise| slopes.with(&noise[0], &mut sum));
             found.push(high.max(-low));
         });
-        Found::of(value, found.first())
+        NumberFound::of(value, found.first())
     }
 }

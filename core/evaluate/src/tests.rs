@@ -15,7 +15,7 @@ use runout_standards::gaps::Gaps;
 use runout_turning::{
     measurement::Response,
     profile::Profile,
-    separation::{Quantity, Residual, SectionAt, Separation},
+    separation::{Quantity, SectionAt, Separation},
     station::StationResult,
     surface::{SurfaceBuilder, SurfaceConfig},
 };
@@ -42,14 +42,7 @@ pub(super) fn station(
         estimate,
         variance: vec![variance; highest + 1],
         observable: (0..=highest).map(|order| !lost.contains(&order)).collect(),
-        motion_covariance: None,
-        form_covariance: None,
-        freedom: 0,
-        equivalents: Vec::new(),
-        form_bound: Vec::new(),
-        motion_z_mm: 0.0,
-        residual: Residual::default(),
-        warnings: Vec::new(),
+        ..Separation::default()
     };
     StationResult { station: format!("s{z_mm}"), z_mm, angles: 720, separation, profiles: Vec::new(), truth: None }
 }

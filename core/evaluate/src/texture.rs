@@ -1,12 +1,9 @@
 //! Texture values of one section around the part.
 
-use super::{Evaluate, Filter, Found, Group, Label, POINTS_A_WAVE, labelled, section::Form};
+use super::{Evaluate, Filter, Group, Label, NumberFound, POINTS_A_WAVE, labelled, section::Form};
 use crate::Value;
 use runout_numerics::fourier::Fourier;
-use runout_standards::{
-    drawn::{Drawn, Sensitivity},
-    texture::{self, Kind, Settings},
-};
+use runout_standards::texture::{self, Kind, Settings};
 
 /// [`POINTS_A_WAVE`] where errors are drawn: there a value's error is sought, not the value. Differences over seven points are
 /// then 0.9 % low at the highest order.
@@ -21,25 +18,15 @@ const COUNTED: &str = "it counts hills and dales: an error that makes or merges 
 const OF_PLATEAUS: &str = "it is read from the material ratio curve where single hills and dales of one profile decide: intervals \
     by draws hold the truth in fewer than 95 %";
 
-/// How values of a profile depend on errors, in the order of [`texture::PARAMETERS`]; or why their intervals do not hold.
-pub(super) fn sensitivity(index: usize) -> Result<Sensitivity, &'static str> {
+/// Why intervals of a value of a profile do not hold, in the order of [`texture::PARAMETERS`].
+pub(super) fn no_interval(index: usize) -> Option<&'static str> {
     match index {
-        // Ra, Rq, Rsk, Rku, Rdq.
-        0..=3 | 5 => Ok(Sensitivity::Mean),
-        // Rt, Rp, Rv, Rz, Rz1max.
-        4 | 6..=8 | 10 => Ok(Sensitivity::Extreme),
+        // Ra, Rq, Rsk, Rku, Rt, Rdq, Rp, Rv, Rz, Rz1max.
+        0..=8 | 10 => None,
         // Rsm, Rc, RPc.
-        9 | 11 | 12 => Err(COUNTED),
-        _ => Err(OF_PLATEAUS),
+        9 | 11 | 12 => Some(COUNTED),
+        _ => Some(OF_PLATEAUS),
     }
-}
-
-/// A number found, with its error as draws give it.
-pub(super) fn found(drawn: Option<&Drawn>, index: usize, value: f64, sensitivity: Result<Sensitivity, &str>) -> Found {
-    let Some(drawn) = drawn else { return Found::of(value, None) };
-    let known = sensitivity.map_err(str::to_owned).and_then(|sensitivity| drawn.uncertainty(index, value, sensitivity));
-    let no_uncertainty = known.as_ref().err().cloned();
-    Found { uncertainty: known.ok(), no_uncertainty, ..Found::of(value, None) }
 }
 
 impl Form {
@@ -64,7 +51,7 @@ impl Form {
                 found.push(texture::ra_um(profile_um));
             },
         );
-        let found = Found::of(value, known.pop().as_ref());
+        let found = NumberFound::of(value, known.pop().as_ref());
         let label = Label::new("Ra", "µm", "Qiao, Xu, Zhao 2024: unfiltered circumferential profile", "mean line");
         self.labelled(vec![label], vec![found], &filter)
     }
@@ -82,8 +69,8 @@ impl Form {
             },
         );
         let found = |index: usize, value: f64, reason: Option<&str>| match (known.get(index), reason) {
-            (Some(_), Some(reason)) => Found { no_uncertainty: Some(reason.to_owned()), ..Found::of(value, None) },
-            (known, _) => Found::of(value, known),
+            (Some(_), Some(reason)) => NumberFound::of(value, None).without_uncertainty(reason),
+            (known, _) => NumberFound::of(value, known),
         };
         let standard = |clause: &str| format!("ISO 21920-2:2021, {clause}");
         let mut labels: Vec<Label> = kind
@@ -92,8 +79,8 @@ impl Form {
             .map(|(symbol, unit, clause)| Label::new(symbol, unit, standard(clause), "mean line"))
             .collect();
         let numbers = values.iter().enumerate();
-        let mut numbers: Vec<Found> =
-            numbers.map(|(index, value)| found(index, *value, sensitivity(index).err())).collect();
+        let mut numbers: Vec<NumberFound> =
+            numbers.map(|(index, value)| found(index, *value, no_interval(index))).collect();
         for height_um in &evaluate.texture.heights_um {
             let reference = format!("{height_um} µm above the mean line");
             labels.push(Label::new(kind.material_ratio_symbol(), "%", standard("material ratio curve"), reference));

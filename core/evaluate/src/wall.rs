@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use super::{Content, Filter, Found, Label, POINTS_A_WAVE, labelled};
+use super::{Content, Filter, Label, NumberFound, POINTS_A_WAVE, labelled};
 use crate::Value;
 use runout_draws::{Draws, Errors, Interval, Measured, seed};
 use runout_numerics::{
@@ -136,7 +136,7 @@ impl Wall {
         values(Look { kind: None, sections: &self.sections(&angles, &forms), largest_um: None }, &mut found);
         let known = self.known(filter, values);
         let known = known.iter().map(Some).chain(std::iter::repeat(None));
-        let found = found.into_iter().zip(known).map(|(value, known)| Found::of(value, known));
+        let found = found.into_iter().zip(known).map(|(value, known)| NumberFound::of(value, known));
         labelled(labels, found.collect(), filter, &self.held, self.coverage())
     }
 

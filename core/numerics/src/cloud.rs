@@ -159,20 +159,20 @@ impl<const D: usize> Cloud<D> {
         vectorised(Those { seen: self.seen(0..self.len(), place), wanted, take });
     }
 
-    fn seen<'a>(&'a self, range: Range<usize>, place: &'a [f64; D]) -> Seen<'a, D> {
+    fn seen<'a>(&'a self, range: Range<usize>, place: &'a [f64; D]) -> PointsSeen<'a, D> {
         let features = std::array::from_fn(|k| &self.features[k][range.clone()]);
-        Seen { levels: &self.levels[range], features, place }
+        PointsSeen { levels: &self.levels[range], features, place }
     }
 }
 
 /// Some points, seen from a place.
-struct Seen<'a, const D: usize> {
+struct PointsSeen<'a, const D: usize> {
     levels: &'a [f64],
     features: [&'a [f64]; D],
     place: &'a [f64; D],
 }
 
-impl<const D: usize> Seen<'_, D> {
+impl<const D: usize> PointsSeen<'_, D> {
     /// Points that fill whole lanes.
     #[inline(always)]
     fn whole(&self) -> usize {
@@ -206,7 +206,7 @@ impl<const D: usize> Seen<'_, D> {
 }
 
 /// The lowest and the highest of some heights.
-struct Extremes<'a, const D: usize>(Seen<'a, D>);
+struct Extremes<'a, const D: usize>(PointsSeen<'a, D>);
 
 impl<const D: usize> NullaryFnOnce for Extremes<'_, D> {
     type Output = (f64, f64);
@@ -235,7 +235,7 @@ impl<const D: usize> NullaryFnOnce for Extremes<'_, D> {
 
 /// Takes the points whose heights are wanted, in their order, as long as `take` returns true.
 struct Those<'a, const D: usize, W, T> {
-    seen: Seen<'a, D>,
+    seen: PointsSeen<'a, D>,
     wanted: W,
     take: T,
 }

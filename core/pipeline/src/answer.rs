@@ -26,8 +26,17 @@ pub struct Answer {
 
 /// Key values at most.
 pub const MOST_KEY_VALUES: usize = 10;
+/// Contradictions that are named.
+const MOST_CONTRADICTIONS: usize = 3;
 
 impl Answer {
+    /// The contradictions that a page names, and how many more there are: all are in the files.
+    #[must_use]
+    pub fn named_contradictions(&self) -> (&[String], usize) {
+        let (named, more) = self.contradictions.split_at(self.contradictions.len().min(MOST_CONTRADICTIONS));
+        (named, more.len())
+    }
+
     /// Whether a warning is among the contradictions already.
     #[must_use]
     pub fn says(&self, warning: &str) -> bool {

@@ -7,7 +7,6 @@ pub mod drawn;
 mod extremes;
 pub mod gaps;
 mod near;
-pub mod open_errors;
 pub mod parameter;
 pub mod position;
 pub mod reference;

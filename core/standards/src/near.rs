@@ -15,7 +15,7 @@ const LANES: usize = 16;
 
 /// The points that may come to touch.
 #[derive(Debug, Clone)]
-pub(super) struct Near {
+pub(super) struct NearContacts {
     /// Their places, ascending.
     pub points: Vec<usize>,
     /// Lowest and highest deviation from the nominal radius.
@@ -23,11 +23,11 @@ pub(super) struct Near {
     margin_um: f64,
 }
 
-impl Near {
+impl NearContacts {
     /// From deviations about a reference whose radius exceeds the nominal one by `level_um`; missing points are NaN.
     /// `usual_um` is about the largest error of a draw.
     pub(crate) fn new(deviations_um: &[f64], level_um: f64, usual_um: f64) -> Self {
-        let Course { low, high, .. } = Course::of(deviations_um.iter().copied());
+        let DeviationSpread { low, high, .. } = DeviationSpread::of(deviations_um.iter().copied());
         let margin_um = MARGIN * usual_um;
         let is_near = |point: &usize| {
             let deviation = deviations_um[*point];
@@ -46,7 +46,7 @@ impl Near {
 
 /// What deviations come to.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Course {
+pub(super) struct DeviationSpread {
     pub low: f64,
     pub high: f64,
     /// Sum of squares.
@@ -55,7 +55,7 @@ pub(super) struct Course {
     pub points: usize,
 }
 
-impl Course {
+impl DeviationSpread {
     /// Missing values are NaN, and so are the ends where nothing is there.
     pub(crate) fn of(deviations: impl Iterator<Item = f64>) -> Self {
         let (mut low, mut high, mut squares, mut points) = (f64::INFINITY, f64::NEG_INFINITY, 0.0, 0);
@@ -98,10 +98,10 @@ struct Differences<'a> {
 }
 
 impl NullaryFnOnce for Differences<'_> {
-    type Output = Course;
+    type Output = DeviationSpread;
 
     #[inline(always)]
-    fn call(self) -> Course {
+    fn call(self) -> DeviationSpread {
         let Self { drawn, offset } = self;
         let (mut low, mut high, mut squares) = ([f64::INFINITY; LANES], [f64::NEG_INFINITY; LANES], [0.0; LANES]);
         let (mut rest_low, mut rest_high, mut rest_squares) = (f64::INFINITY, f64::NEG_INFINITY, 0.0);
@@ -121,7 +121,7 @@ impl NullaryFnOnce for Differences<'_> {
             (rest_low, rest_high) = (rest_low.min(deviation), rest_high.max(deviation));
             rest_squares += deviation * deviation;
         }
-        Course {
+        DeviationSpread {
             low: rest_low.min(folded(low, f64::min)),
             high: rest_high.max(folded(high, f64::max)),
             squares: rest_squares + folded(squares, |one, other| one + other),

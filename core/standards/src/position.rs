@@ -1,7 +1,7 @@
 //! Position and run-out of sections about a datum axis (ISO 1101, ISO 5459), where the sections' centres are known in one
 //! system of coordinates.
 
-use super::{cylindricity::Section, near::Course, roundness};
+use super::{cylindricity::Section, near::DeviationSpread, roundness};
 
 /// A datum axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -76,9 +76,12 @@ impl Positions {
                     let distance = 1e3 * radius_mm + form;
                     distance_um([distance * cos, distance * sin, section.z_mm], axis)
                 });
-                Course::of(at)
+                DeviationSpread::of(at)
             });
-            of_section.filter(|course| course.points > 0).reduce(Course::and).map_or(f64::NAN, |all| all.high - all.low)
+            of_section
+                .filter(|course| course.points > 0)
+                .reduce(DeviationSpread::and)
+                .map_or(f64::NAN, |all| all.high - all.low)
         };
         Self {
             circular_runout_um: sections.iter().map(|section| range(std::slice::from_ref(section))).collect(),

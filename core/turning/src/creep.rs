@@ -78,14 +78,14 @@ impl Levels {
 /// How a creep goes on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
-pub enum Course {
+pub enum CreepLaw {
     /// By the same amount each turn.
     Straight,
     /// Ever slower: e^{−t/τ}, τ in turns.
     Settling(f64),
 }
 
-impl Course {
+impl CreepLaw {
     /// Creep since the start after some turns, for a rate of 1 at the start.
     #[must_use]
     pub fn at(self, turns: f64) -> f64 {
@@ -101,7 +101,7 @@ impl Course {
 #[non_exhaustive]
 pub struct Creep {
     /// How it goes on.
-    pub course: Course,
+    pub course: CreepLaw,
     /// Rate at the start of each capture, in µm per turn.
     pub rates: Vec<f64>,
     /// Standard uncertainty of each rate; where the captures share the creep, of that.
@@ -167,7 +167,7 @@ struct Sensor {
 
 /// A course fitted to levels.
 struct Fitted {
-    course: Course,
+    course: CreepLaw,
     /// Common rate, and that of each capture.
     shared: f64,
     rates: Vec<f64>,
@@ -197,7 +197,7 @@ impl Sensor {
     }
 
     /// A course of any time constant.
-    fn fit(&self, course: Course) -> Fitted {
+    fn fit(&self, course: CreepLaw) -> Fitted {
         let mut shapes: Vec<Shape> = Vec::with_capacity(self.captures.len());
         for (capture, levels) in self.captures.iter().enumerate() {
             let alike = (0..capture).find(|before| Arc::ptr_eq(&self.tried[*before], &self.tried[capture]));
@@ -207,7 +207,7 @@ impl Sensor {
     }
 
     /// A course with its shape in each capture.
-    fn fit_shapes<'a>(&self, course: Course, shapes: impl Iterator<Item = &'a Shape>) -> Fitted {
+    fn fit_shapes<'a>(&self, course: CreepLaw, shapes: impl Iterator<Item = &'a Shape>) -> Fitted {
         let mut fitted =
             Fitted { course, shared: 0.0, rates: Vec::new(), squares: Vec::new(), left: 0.0, left_each: Vec::new() };
         let (mut products, mut total) = (0.0, 0.0);
@@ -228,7 +228,7 @@ impl Sensor {
 
     /// The fits of all time constants that are tried, ascending.
     fn fits_tried(&self) -> Vec<Fitted> {
-        let course = |step: usize| Course::Settling(shape::tau_tried(self.turns, step));
+        let course = |step: usize| CreepLaw::Settling(shape::tau_tried(self.turns, step));
         let fit = |step: usize| self.fit_shapes(course(step), self.tried.iter().map(|shapes| &shapes.settling[step]));
         (0..shape::TRIED).map(fit).collect()
     }
@@ -241,13 +241,13 @@ impl Sensor {
         let tau = |step: usize| shape::tau_tried(self.turns, step);
         let (low, high) = (tau(best.saturating_sub(1)), tau((best + 1).min(shape::TRIED - 1)));
         let tau =
-            golden_section::maximum(low, high, REFINED * (high - low), |tau| -left(&self.fit(Course::Settling(tau))));
-        self.fit(Course::Settling(tau))
+            golden_section::maximum(low, high, REFINED * (high - low), |tau| -left(&self.fit(CreepLaw::Settling(tau))));
+        self.fit(CreepLaw::Settling(tau))
     }
 
     /// The course that has more evidence: a time constant is one parameter more.
     fn best(&self, tried: &[Fitted], left: impl Fn(&Fitted) -> f64) -> Fitted {
-        let straight = self.fit_shapes(Course::Straight, self.tried.iter().map(|shapes| &shapes.straight));
+        let straight = self.fit_shapes(CreepLaw::Straight, self.tried.iter().map(|shapes| &shapes.straight));
         let settling = self.settling(tried, &left);
         let gain = self.observations * (left(&straight) / left(&settling).max(f64::MIN_POSITIVE)).ln();
         if gain > self.observations.ln().max(0.0) { settling } else { straight }
@@ -350,15 +350,15 @@ impl Sensor {
 
     /// τ and its standard uncertainty, where it is determined.
     fn time_constant(&self, fitted: &Fitted, noise: f64, std: Option<f64>) -> Option<[f64; 2]> {
-        let Course::Settling(tau) = fitted.course else { return None };
+        let CreepLaw::Settling(tau) = fitted.course else { return None };
         let std = std.unwrap_or_else(|| Partials::new(self, fitted).std(noise, 1));
         (tau > DETERMINED * std).then_some([tau, std])
     }
 }
 
 /// Parameters of a course beside its size.
-fn extra(course: Course) -> f64 {
-    if course == Course::Straight { 0.0 } else { 1.0 }
+fn extra(course: CreepLaw) -> f64 {
+    if course == CreepLaw::Straight { 0.0 } else { 1.0 }
 }
 
 /// Independent differences between captures: sensors see two directions between them.

@@ -8,7 +8,7 @@ use crate::{
     neighbours::Neighbours,
     spread::Spread,
 };
-use runout_consistency::turns::{Course, PhaseCourse};
+use runout_consistency::turns::{PhaseCourse, TurnCourse};
 use runout_numerics::Complex64;
 use std::f64::consts::FRAC_1_SQRT_2;
 
@@ -42,7 +42,7 @@ pub struct Profile {
     /// Mean level of each turn used.
     pub levels: TurnLevels,
     /// What the low orders of its turns say of their course.
-    pub course: Course,
+    pub course: TurnCourse,
     /// What its marks were put right by, where they do not count the part's turns.
     pub recounted: Option<Recounted>,
     /// The same turns in parts, where asked for.

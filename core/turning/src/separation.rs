@@ -89,8 +89,9 @@ impl Assessment {
 
 /// Form and motion at one station.
 ///
-/// Order 0 is the mean level, which displacement sensors do not share: 0 unless the method knows better.
-#[derive(Debug, Clone, PartialEq)]
+/// Order 0 is the mean level, which displacement sensors do not share: 0 unless the method knows better. The default has nothing, and a
+/// separator states what it knows.
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Separation {
     /// The sections it gives the form of.
     pub sections: Vec<SectionAt>,

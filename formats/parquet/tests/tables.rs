@@ -13,7 +13,7 @@ use runout_core::{
     evaluate::Value,
     pipeline::{Context, StageConfig, run::StationTables},
     provenance::{Input, Provenance},
-    separation::{Quantity, Residual, SectionAt, Separation},
+    separation::{Quantity, SectionAt, Separation},
     station::StationResult,
     summary::{LostOrders, PartSummary, SectionSummary, StationSummary, Summary},
 };
@@ -53,14 +53,7 @@ fn station(index: usize, motion: bool) -> StationResult {
         variance: places().map(|(order, _)| if lost(order) { f64::NAN } else { 0.02 }).collect(),
         observable: places().map(|(order, _)| !lost(order)).collect(),
         unknowns,
-        motion_covariance: None,
-        form_covariance: None,
-        freedom: 0,
-        equivalents: Vec::new(),
-        form_bound: Vec::new(),
-        motion_z_mm: 0.0,
-        residual: Residual::default(),
-        warnings: Vec::new(),
+        ..Separation::default()
     };
     let station = format!("s{index:02}");
     StationResult { station, z_mm, angles: ANGLES, separation, profiles: Vec::new(), truth: None }

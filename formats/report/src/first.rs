@@ -11,8 +11,6 @@ use crate::{limits, symbol};
 
 /// Warnings that are shown unfolded.
 const SHOWN: usize = 4;
-/// Contradictions that are shown, as in a terminal; all are in the table of the tests.
-const MOST_CONTRADICTIONS: usize = 3;
 
 /// The class of a judgement in the style sheet.
 pub(crate) fn class(judgement: Judgement) -> &'static str {
@@ -25,13 +23,12 @@ pub(crate) fn class(judgement: Judgement) -> &'static str {
 
 /// Key values, the loop and the limits; beside them `figure`, the one to look at first.
 pub(crate) fn screen(answer: &Answer, summary: &Summary, figure: Option<Markup>) -> Markup {
+    let (contradictions, more) = answer.named_contradictions();
     html! {
         div.first {
             div {
-                @for reason in answer.contradictions.iter().take(MOST_CONTRADICTIONS) { p.doubt { "! " bdi { (reason) } } }
-                @if answer.contradictions.len() > MOST_CONTRADICTIONS {
-                    p.doubt { "! " (answer.contradictions.len() - MOST_CONTRADICTIONS) " more: see the consistency of the data" }
-                }
+                @for reason in contradictions { p.doubt { "! " bdi { (reason) } } }
+                @if more > 0 { p.doubt { "! " (more) " more: see the consistency of the data" } }
                 @if !answer.steps.is_empty() {
                     section.steps aria-label="Closed loop" { @for step in &answer.steps { p { bdi { (step) } } } }
                 }

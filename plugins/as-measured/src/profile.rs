@@ -2,10 +2,10 @@
 
 use runout_core::{
     Error, ErrorKind, Result,
+    draws::OpenErrors,
     height_grid::GridPlaces,
     points::Points,
     stage::{Evaluable, OpenProfile, Outcome},
-    standards::open_errors::OpenErrors,
     table::{ColumnSpec, Figure, Measure, TableRows, TableSpec, numbers},
 };
 

@@ -262,12 +262,7 @@ impl LeastSquaresCylinder {
             observable: vec![true; orders],
             estimate,
             variance,
-            motion_covariance: None,
-            form_covariance: None,
             freedom: fit.remainder().dof,
-            equivalents: Vec::new(),
-            form_bound: Vec::new(),
-            motion_z_mm: 0.0,
             residual: Residual {
                 rms_um: fit.remainder().rms,
                 expected_rms_um: f64::NAN,
@@ -276,6 +271,7 @@ impl LeastSquaresCylinder {
                 ..Residual::default()
             },
             warnings: circle.warnings.clone(),
+            ..Separation::default()
         }
     }
 }

@@ -232,12 +232,7 @@ impl LeastSquaresCylinder {
             observable,
             estimate,
             variance,
-            motion_covariance: None,
-            form_covariance: None,
             freedom: fit.dof,
-            equivalents: Vec::new(),
-            form_bound: Vec::new(),
-            motion_z_mm: 0.0,
             residual: Residual {
                 rms_um: fit.residual_rms_um,
                 expected_rms_um: f64::NAN,
@@ -247,6 +242,7 @@ impl LeastSquaresCylinder {
                 ..Residual::default()
             },
             warnings: circle.warnings,
+            ..Separation::default()
         })
     }
 

@@ -29,12 +29,12 @@ pub struct Check {
     /// What must hold.
     pub name: &'static str,
     /// What was found.
-    pub found: Found,
+    pub found: CheckResult,
 }
 
 /// What a check found.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Found {
+pub enum CheckResult {
     /// It holds.
     Holds,
     /// It cannot be said, and why.
@@ -82,8 +82,8 @@ impl Conformance {
         begin()?;
         let stations = [1, 2, 3].map(|number| self.station(number, 1.0, 1.0));
         let mut checks = Vec::new();
-        let mut add = |name, found: std::result::Result<Found, String>| {
-            checks.push(Check { name, found: found.unwrap_or_else(Found::Fails) });
+        let mut add = |name, found: std::result::Result<CheckResult, String>| {
+            checks.push(Check { name, found: found.unwrap_or_else(CheckResult::Fails) });
         };
         let all = |stations: &[&Station]| -> Result<Vec<Separation>> {
             let separator = begin().map_err(|fault| Error::new("start", "the program", fault.message))?;
@@ -92,8 +92,8 @@ impl Conformance {
         let [first, second, third] = &stations;
         let usual = all(&[first, second, third]);
         let is_answer = usual.as_ref().err().is_none_or(|error| error.kind() == ErrorKind::DamagedData);
-        let failure = || usual.as_ref().err().map_or(Ok(Found::Holds), |error| Err(error.to_string()));
-        add("it starts and answers", if is_answer { Ok(Found::Holds) } else { failure() });
+        let failure = || usual.as_ref().err().map_or(Ok(CheckResult::Holds), |error| Err(error.to_string()));
+        add("it starts and answers", if is_answer { Ok(CheckResult::Holds) } else { failure() });
         if is_answer {
             add("its answers are in the protocol", failure());
         }
@@ -103,14 +103,14 @@ impl Conformance {
         let again = all(&[first, first]);
         add(
             "equal data give equal results, in one process and in another",
-            again.and_then(|again| again.iter().try_for_each(|one| equal(&usual[0], one)).map(|()| Found::Holds)),
+            again.and_then(|again| again.iter().try_for_each(|one| equal(&usual[0], one)).map(|()| CheckResult::Holds)),
         );
         let turned = all(&[third, first, second]);
         add(
             "the order of stations does not matter",
             turned.and_then(|turned| {
                 let pairs = [(2, 0), (0, 1), (1, 2)];
-                pairs.iter().try_for_each(|(a, b)| equal(&usual[*a], &turned[*b])).map(|()| Found::Holds)
+                pairs.iter().try_for_each(|(a, b)| equal(&usual[*a], &turned[*b])).map(|()| CheckResult::Holds)
             }),
         );
         add("an order that the rig loses is lost at every station", lost_alike(&usual));
@@ -140,14 +140,14 @@ impl Conformance {
     }
 
     /// All sensors look along one line: form is then motion along it, at every order.
-    fn inseparable(&self, folder: &Path) -> std::result::Result<Found, String> {
+    fn inseparable(&self, folder: &Path) -> std::result::Result<CheckResult, String> {
         let mut rig = self.rig.clone();
         let angle_rad = rig.sensors.first().map_or(0.0, |sensor| sensor.angle_rad);
         rig.sensors.iter_mut().for_each(|sensor| sensor.angle_rad = angle_rad);
         rig.setups.truncate(1);
         let separator = self.begin(folder, &rig).map_err(|fault| fault.to_string())?;
         match separator.separate(&station(&rig, 1, 1.0, 1.0)) {
-            Err(error) if in_words(&error) => Ok(Found::Holds),
+            Err(error) if in_words(&error) => Ok(CheckResult::Holds),
             Err(error) => Err(format!("it fails without words: {error}")),
             Ok(found) => {
                 let width = found.unknowns.len();
@@ -155,7 +155,7 @@ impl Conformance {
                     (0..width)
                         .any(|unknown| found.unknowns[unknown].is_form() && found.observable[order * width + unknown])
                 });
-                given.map_or(Ok(Found::Holds), |order| {
+                given.map_or(Ok(CheckResult::Holds), |order| {
                     Err(format!("all sensors look along one line, and form of order {order} is a number"))
                 })
             }
@@ -163,7 +163,7 @@ impl Conformance {
     }
 
     /// Profiles without a column that they must have.
-    fn refuses_bad_input(&self, folder: &Path, station: &Station) -> std::result::Result<Found, String> {
+    fn refuses_bad_input(&self, folder: &Path, station: &Station) -> std::result::Result<CheckResult, String> {
         let separator = self.begin(folder, &self.rig).map_err(|fault| fault.to_string())?;
         let request = separator.request(station, Some("re")).map_err(|error| error.to_string())?;
         let session = self.session(folder).map_err(|fault| fault.to_string())?;
@@ -172,7 +172,7 @@ impl Conformance {
             Err(failure) if failure.said.is_empty() => {
                 Err(format!("it {} and says nothing on stderr", failure.problem))
             }
-            Err(failure) if failure.problem.starts_with("ended with") => Ok(Found::Holds),
+            Err(failure) if failure.problem.starts_with("ended with") => Ok(CheckResult::Holds),
             Err(failure) => Err(format!("it {}: expected an exit status above 0", failure.problem)),
         }
     }
@@ -183,9 +183,9 @@ fn in_words(error: &Error) -> bool {
     error.to_string().contains("its stderr ends with")
 }
 
-fn answers(found: &[Separation]) -> std::result::Result<Found, String> {
+fn answers(found: &[Separation]) -> std::result::Result<CheckResult, String> {
     let some = |one: &Separation| one.observable.iter().skip(2 * one.unknowns.len()).any(|seen| *seen);
-    if found.iter().all(some) { Ok(Found::Holds) } else { Err("every order from 2 is lost".into()) }
+    if found.iter().all(some) { Ok(CheckResult::Holds) } else { Err("every order from 2 is lost".into()) }
 }
 
 fn equal(one: &Separation, other: &Separation) -> std::result::Result<(), String> {
@@ -199,7 +199,7 @@ fn equal(one: &Separation, other: &Separation) -> std::result::Result<(), String
     Ok(())
 }
 
-fn lost_alike(found: &[Separation]) -> std::result::Result<Found, String> {
+fn lost_alike(found: &[Separation]) -> std::result::Result<CheckResult, String> {
     let first = &found[0];
     for other in found {
         if let Some(place) =
@@ -208,10 +208,10 @@ fn lost_alike(found: &[Separation]) -> std::result::Result<Found, String> {
             return Err(format!("{} is lost at one station and a number at another", named(first, place)));
         }
     }
-    Ok(Found::Holds)
+    Ok(CheckResult::Holds)
 }
 
-fn scales(one: &Separation, scaled: &Separation) -> std::result::Result<Found, String> {
+fn scales(one: &Separation, scaled: &Separation) -> std::result::Result<CheckResult, String> {
     lost_alike(&[one.clone(), scaled.clone()])?;
     let largest = one.estimate.iter().map(|value| value.norm()).filter(|size| size.is_finite()).fold(0.0, f64::max);
     for place in (0..one.estimate.len()).filter(|place| one.observable[*place]) {
@@ -222,16 +222,16 @@ fn scales(one: &Separation, scaled: &Separation) -> std::result::Result<Found, S
         }
         deviations(one, scaled, place, SCALE)?;
     }
-    Ok(Found::Holds)
+    Ok(CheckResult::Holds)
 }
 
-fn noise_doubles(one: &Separation, noisy: &Separation) -> std::result::Result<Found, String> {
+fn noise_doubles(one: &Separation, noisy: &Separation) -> std::result::Result<CheckResult, String> {
     let seen = |place: &usize| one.observable[*place] && *place >= one.unknowns.len();
     if (0..one.variance.len()).filter(seen).all(|place| one.variance[place].is_nan()) {
-        return Ok(Found::NotTested("it gives no `std`".into()));
+        return Ok(CheckResult::NotTested("it gives no `std`".into()));
     }
     (0..one.variance.len()).filter(seen).try_for_each(|place| deviations(one, noisy, place, 2.0))?;
-    Ok(Found::Holds)
+    Ok(CheckResult::Holds)
 }
 
 fn deviations(one: &Separation, other: &Separation, place: usize, factor: f64) -> std::result::Result<(), String> {

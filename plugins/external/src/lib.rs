@@ -27,7 +27,7 @@ pub use code::{CodeKind, register_code};
 pub use config::{
     ExternalEvaluatorConfig, ExternalExporterConfig, ExternalLoaderConfig, ExternalSeparatorConfig, Gives,
 };
-pub use conformance::{Check, Conformance, Found};
+pub use conformance::{Check, CheckResult, Conformance};
 pub use effect::{EffectParameter, ExternalEffectConfig};
 pub use process::end_all;
 pub use responder::{Answers, Code};

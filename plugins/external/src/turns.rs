@@ -192,13 +192,8 @@ impl TurnSeparator {
             unknowns: self.unknowns.clone(),
             estimate,
             variance,
-            motion_covariance: None,
-            form_covariance: None,
-            freedom: 0,
-            equivalents: Vec::new(),
             observable,
             motion_z_mm: if has_tilt(&self.rig) { 0.0 } else { mean_z_mm + station.z_mm },
-            form_bound: Vec::new(),
             residual: Residual {
                 rms_um: f64::NAN,
                 expected_rms_um: f64::NAN,
@@ -206,6 +201,7 @@ impl TurnSeparator {
                 ..Residual::default()
             },
             warnings,
+            ..Separation::default()
         })
     }
 

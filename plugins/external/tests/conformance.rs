@@ -5,7 +5,7 @@
 use std::{fs, path::Path};
 
 use crate::support::{of_repository, python};
-use runout_external::{Check, Conformance, Found};
+use runout_external::{Check, CheckResult, Conformance};
 use serde_json::Map;
 
 fn checks(python: &str, script: &Path) -> Vec<Check> {
@@ -20,7 +20,7 @@ fn a_program_that_is_right_passes_and_each_mistake_is_named() {
     let script = of_repository("examples/26-own-program/three_point.py");
     for check in checks(&python, &script) {
         println!("{check:?}");
-        assert_eq!(check.found, Found::Holds, "{}", check.name);
+        assert_eq!(check.found, CheckResult::Holds, "{}", check.name);
     }
     let text = fs::read_to_string(&script).unwrap();
     let folder = tempfile::tempdir().unwrap();
@@ -45,7 +45,7 @@ fn a_program_that_is_right_passes_and_each_mistake_is_named() {
         let checks = checks(&python, &script);
         let check = checks.iter().find(|check| check.name.starts_with(name)).unwrap();
         println!("{check:?}");
-        assert!(matches!(check.found, Found::Fails(_)), "{name}");
+        assert!(matches!(check.found, CheckResult::Fails(_)), "{name}");
     }
     let others = [
         ("", "it starts and answers", "closed its output"),
@@ -60,8 +60,8 @@ fn a_program_that_is_right_passes_and_each_mistake_is_named() {
         let script = folder.path().join("wrong.py");
         fs::write(&script, text).unwrap();
         let checks = checks(&python, &script);
-        let failed: Vec<&Check> = checks.iter().filter(|check| check.found != Found::Holds).collect();
-        let [Check { name: failed, found: Found::Fails(why) }] = failed[..] else { panic!("{checks:?}") };
+        let failed: Vec<&Check> = checks.iter().filter(|check| check.found != CheckResult::Holds).collect();
+        let [Check { name: failed, found: CheckResult::Fails(why) }] = failed[..] else { panic!("{checks:?}") };
         assert!(*failed == name && why.contains(words), "{checks:?}");
     }
 }

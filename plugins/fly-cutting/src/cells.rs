@@ -1,5 +1,6 @@
 //! Means of passes over their width, bin by bin along y: what tests of independence are made on. Material has a texture: neighbouring
-//! points are not independent, means of a pass depend on each other along it, and passes are independent.
+//! points are not independent, means of a pass depend on each other along it, and passes are independent. Each mean is scaled so that
+//! all have one variance, whatever the number of their points.
 
 use std::f64::consts::TAU;
 
@@ -37,6 +38,8 @@ pub(crate) struct Cells {
     first: i32,
     passes: usize,
     bins: usize,
+    /// Points of a mean, harmonic: by which its variance is smaller.
+    averaged: f64,
 }
 
 impl Cells {
@@ -70,7 +73,9 @@ impl Cells {
             cells.push(Cell { y_mm: cell.y_mm / cell.points, angle: cell.angle / cell.points, ..cell });
         }
         of.iter_mut().for_each(|index| *index = place[*index]);
-        Self { all: cells, of, first, passes, bins }
+        let inverse: f64 = cells.iter().map(|cell| cell.points.recip()).sum();
+        let averaged = cells.len() as f64 / inverse.max(f64::MIN_POSITIVE);
+        Self { all: cells, of, first, passes, bins, averaged }
     }
 
     /// Passes from the first to the last.
@@ -78,12 +83,12 @@ impl Cells {
         self.passes
     }
 
-    /// Points of a mean, harmonic: by which its variance is smaller.
+    /// Points by which the variance of a scaled mean is smaller than that of a point.
     pub(crate) fn averaged(&self) -> f64 {
-        self.all.len() as f64 / self.all.iter().map(|cell| cell.points.recip()).sum::<f64>().max(f64::MIN_POSITIVE)
+        self.averaged
     }
 
-    /// Means of values at the points.
+    /// Scaled means of values at the points.
     pub(crate) fn means(&self, values: &[f64]) -> Vec<f64> {
         let mut sums = vec![0.0; self.all.len()];
         for (index, value) in self.of.iter().zip(values) {
@@ -91,7 +96,7 @@ impl Cells {
                 *sum += value;
             }
         }
-        sums.iter().zip(&self.all).map(|(sum, cell)| sum / cell.points).collect()
+        sums.iter().zip(&self.all).map(|(sum, cell)| sum / (cell.points * self.averaged).sqrt()).collect()
     }
 
     /// The group of passes that a pass is in.

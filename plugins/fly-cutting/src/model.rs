@@ -7,7 +7,7 @@ use std::sync::{Arc, OnceLock};
 use runout_core::{
     Error, Result,
     closed_loop::{
-        Bias, Effect, Fit, Model, Outcome, Remainder, Setting,
+        Bias, Effect, Fit, LookedAt, Model, Remainder, Setting,
         diagnosis::{Estimated, Unexplained},
         fit::refit,
         tested::Tested,
@@ -397,7 +397,7 @@ impl Fit for CutFit {
         parameters.into_iter().zip(columns).map(of).collect()
     }
 
-    fn values(&self) -> Vec<Outcome> {
+    fn values(&self) -> Vec<LookedAt> {
         Vec::new()
     }
 

@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
 use crate::common;
-use crate::common::{CUT, diagnose, listing, parameter, run, scenario, separator, value};
+use crate::common::{CUT, diagnose, listing, of, parameter, run, scenario, separator, value};
 use runout_core::{closed_loop::diagnosis::Verdict, points::Points};
 
 const SIDE: usize = 160;
@@ -16,6 +16,30 @@ fn clean_surfaces_name_nothing() {
         assert_eq!(found.diagnosis.verdict, Verdict::AtNoiseFloor, "{}", listing(&found.diagnosis));
         assert!(found.diagnosis.added.is_empty());
     }
+}
+
+/// Passes at the edge of the map, and narrow ones, have means of fewer points.
+#[test]
+fn passes_of_unequal_width_scatter_alike() {
+    let mut said = Vec::new();
+    for seed in 0..6 {
+        for line in [0.0, 20.0] {
+            let effect = if line > 0.0 {
+                format!(
+                    "[[effect]]\nplugin = 'spindle-line'\nfrequency_hz = 21.905\namplitude_nm = {line}\nphase_deg = 20.0\n"
+                )
+            } else {
+                String::new()
+            };
+            let grid = "[grid]\nrows = 100\ncolumns = 500\nstep_x_mm = 0.0005\nstep_y_mm = 0.1\norigin_y_mm = -5\n";
+            let map = of(&format!("noise_nm = 2.0\nseed = {seed}\n{effect}[cut]\n{CUT}{grid}"));
+            let found = diagnose(map.heights().unwrap(), &separator(&format!("std_nm = 2.0\n{CUT}"))).diagnosis;
+            if found.verdict == Verdict::Unexplained || found.added.len() != usize::from(line > 0.0) {
+                said.push(format!("seed {seed}, line of {line} nm: {}", listing(&found)));
+            }
+        }
+    }
+    assert!(said.is_empty(), "{said:#?}");
 }
 
 #[test]

@@ -1,20 +1,14 @@
 //! Means and standard deviations of approaches, the values of ISO 230-2 of them, and what is to be said of the runs.
 
-use crate::{
-    draws::Draw,
-    runs::{Approaches, Noise, mean, std},
-};
+use runout_core::draws::Draw;
+
+use crate::runs::{Approaches, Noise, mean, std};
 
 /// Runs are off as a whole where their means scatter by so many times what the noise at single targets makes.
 const OFF: f64 = 3.0;
 /// They drift where their means go with their number, by this correlation, which chance makes once in a hundred of five runs.
 const TREND: f64 = 0.93;
 const FEWEST_FOR_A_TREND: usize = 4;
-/// Neighbouring deviations of a run depend on each other from this correlation on, where it is not chance.
-const DEPENDENT: f64 = 0.3;
-/// Standard deviations of a correlation of independent numbers that are no chance.
-const NO_CHANCE: f64 = 3.0;
-
 /// How remarks name what a test has.
 pub(crate) struct Terms {
     pub unit: &'static str,
@@ -52,14 +46,6 @@ pub(crate) fn remarks(approaches: &Approaches, noise: &Noise, terms: &Terms) -> 
             format!("runs differ as a whole, by a standard deviation of {:.2} {unit}; {contain}", noise.common_std)
         });
     }
-    let independent = NO_CHANCE / (noise.freedom_own as f64).sqrt();
-    if !noise.copies && noise.neighbours > DEPENDENT.max(independent) {
-        remarks.push(format!(
-            "within a run the deviations of neighbouring targets depend on each other (correlation {:.2}): means are less certain than their ±",
-            noise.neighbours
-        ));
-    }
-    remarks.extend(approaches.outliers(noise.own_std, unit, contain));
     if approaches.sides.len() == 1 {
         remarks.push(
             "all targets were approached from one side: there is no reversal value and no bidirectional value".into(),

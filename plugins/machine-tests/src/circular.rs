@@ -27,7 +27,11 @@ use runout_core::{
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::paths::{Paths, mean_of, refused};
+use crate::{
+    paths::{Paths, mean_of, refused},
+    repeated::in_order,
+    runs::mean,
+};
 
 /// `[separate] plugin = "circular"`.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
@@ -116,6 +120,11 @@ impl PointSeparator for Circular {
                 "the path was recorded in one direction: there is no hysteresis and no bidirectional value".into(),
             );
         }
+        // The mean radius of each turn: it drifts, or one turn is unlike the others.
+        let sides = paths.signs.iter().map(|sign| if *sign > 0 { "radius of + turn" } else { "radius of - turn" });
+        let radii: Vec<Vec<f64>> =
+            paths.turns.iter().map(|turns| turns.iter().map(|turn| mean(turn)).collect()).collect();
+        let series: Vec<(&str, &[f64])> = sides.zip(radii.iter().map(Vec::as_slice)).collect();
         let named = |(index, (symbol, value, about)): (usize, (String, f64, &'static str))| {
             let known = known.get(index).and_then(|known| known.at(value));
             let known =
@@ -131,6 +140,7 @@ impl PointSeparator for Circular {
             ),
             tables: vec![rows(&paths, &of_means)?],
             values: values.into_iter().enumerate().map(named).collect(),
+            checks: in_order("the turns", &series, "µm"),
             remarks,
             ..Outcome::default()
         })

@@ -11,7 +11,7 @@
 
 use runout_core::{
     Error, ErrorKind, Result,
-    draws::seed,
+    draws::{Draw, Truth, seed},
     fault::Fault,
     pipeline::{Context, StageConfig},
     points::{
@@ -27,7 +27,8 @@ use serde::Deserialize;
 
 use crate::{
     cells::{Cells, Terms, remarks},
-    draws::{Computed, Draw, Machine, with_uncertainty},
+    draws::{Computed, with_uncertainty},
+    repeated,
     runs::{Approaches, Noise},
 };
 
@@ -207,7 +208,7 @@ impl PointSeparator for Diagonals {
                 of.push((*kind).to_owned());
             }
         }
-        let error = |machine: Machine, draw: &mut Draw| self.errors(&all, &members, &found, machine, draw);
+        let error = |truth: Truth, draw: &mut Draw| self.errors(&all, &members, &found, truth, draw);
         let mut values = with_uncertainty(&computed, "um", seed(&["diagonals"]), error);
         let copied = |of: &str| {
             let silent = |one: &Diagonal| one.noise.copies;
@@ -229,7 +230,10 @@ impl PointSeparator for Diagonals {
             values: values.into_iter().zip(of).map(|(value, of)| value.of(&of)).collect(),
             checks: all
                 .iter()
-                .flat_map(|one| one.approaches.alike(&one.noise, "mm").into_iter().map(|check| check.within(&one.id)))
+                .flat_map(|one| {
+                    let found = repeated::approaches(&one.approaches, &one.noise.along, ["mm", "µm"]);
+                    found.into_iter().map(|check| check.within(&one.id))
+                })
                 .collect(),
             remarks: said,
             ..Outcome::default()
@@ -243,20 +247,20 @@ impl Diagonals {
         all: &[Diagonal],
         members: &[Vec<(usize, usize, &Diagonal)>],
         found: &[Vec<f64>],
-        machine: Machine,
+        truth: Truth,
         draw: &mut Draw,
     ) -> Vec<f64> {
         // µm/m of mm is nm.
         let scale = 1e-3 * self.0.scale_std_ppm * draw.normal();
         let mut drawn = |one: &Diagonal| {
-            let cells = if machine == Machine::Least { &one.least } else { &one.cells };
+            let cells = if truth == Truth::Least { &one.least } else { &one.cells };
             cells.errors(&one.approaches, &one.noise, scale, draw)
         };
         let errors: Vec<Vec<f64>> = all.iter().map(&mut drawn).collect();
         let mut each: Vec<f64> = errors.concat();
         for of in members {
             let top = largest(of.iter().map(|(index, place, _)| found[*index][*place]));
-            let error = if machine == Machine::Least {
+            let error = if truth == Truth::Least {
                 // Any of those that noise may have kept from being the largest: the one that it raises most.
                 let near = of.iter().filter(|(index, place, one)| found[*index][*place] + one.reach() >= top);
                 largest(near.map(|(index, place, _)| errors[*index][*place]))

@@ -23,7 +23,7 @@ mod course;
 
 use runout_core::{
     Error, ErrorKind, Result,
-    draws::{NORMAL_95, Uncertainty, seed},
+    draws::{Draw, NORMAL_95, Uncertainty, seed},
     fault::Fault,
     pipeline::{Context, StageConfig},
     points::{PointColumn, PointKind::Number, Points},
@@ -34,7 +34,6 @@ use runout_core::{
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::draws::Draw;
 use course::{OF_SECOND_DIFFERENCES, levels, noise_of, range, smoothed, stable_after, within_ends};
 
 /// Means that a test has at least: fewer show neither their noise nor a course.

@@ -18,6 +18,7 @@ mod drift;
 mod paths;
 mod positioning;
 mod probing;
+mod repeated;
 mod rotary_path;
 mod runs;
 mod structural;

@@ -19,7 +19,7 @@
 
 use runout_core::{
     Result,
-    draws::seed,
+    draws::{Draw, Truth, seed},
     fault::Fault,
     pipeline::{Context, StageConfig},
     points::{PointColumn, PointKind::Number, Points},
@@ -31,7 +31,8 @@ use serde::Deserialize;
 
 use crate::{
     cells::{Cells, Terms, remarks},
-    draws::{Computed, Draw, Machine, with_uncertainty},
+    draws::{Computed, with_uncertainty},
+    repeated,
     runs::Approaches,
 };
 
@@ -152,8 +153,8 @@ impl PointSeparator for Positioning {
         let scale = self.0.scale_std_ppm * if self.0.rotary { 3.6e-3 } else { 1e-3 };
         let noise = approaches.noise();
         let least = cells.levelled(&noise, approaches.targets.len());
-        let error = |machine: Machine, draw: &mut Draw| {
-            let cells = if machine == Machine::Least { &least } else { &cells };
+        let error = |truth: Truth, draw: &mut Draw| {
+            let cells = if truth == Truth::Least { &least } else { &cells };
             let scale = scale * draw.normal();
             cells.errors(&approaches, &noise, scale, draw)
         };
@@ -171,7 +172,7 @@ impl PointSeparator for Positioning {
             ),
             tables: vec![self.rows(&approaches, &cells)?],
             values: values.into_iter().map(|value| value.of(&self.0.axis)).collect(),
-            checks: approaches.alike(&noise, target.unit),
+            checks: repeated::approaches(&approaches, &noise.along, [target.unit, deviation.unit]),
             remarks: remarks(&approaches, &noise, &terms),
             ..Outcome::default()
         })

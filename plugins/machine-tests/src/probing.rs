@@ -15,7 +15,7 @@ mod range;
 
 use runout_core::{
     Error, ErrorKind, Result,
-    draws::seed,
+    draws::{Draw, Truth, seed, without_noise},
     fault::Fault,
     pipeline::{Context, StageConfig},
     points::{
@@ -31,12 +31,12 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use crate::{
-    draws::{Computed, Draw, Machine, with_uncertainty, without_noise},
+    draws::{Computed, with_uncertainty},
+    repeated::{Said, in_order},
     runs::mean,
 };
 use ball::Touches;
 pub(crate) use ball::range;
-pub(crate) use range::course;
 use range::of_range;
 
 /// Touches of a sphere that the standard asks for.
@@ -45,11 +45,6 @@ const ON_SPHERE: usize = 25;
 const FEWEST: usize = 3;
 /// Sets of touches drawn for the mean range of one.
 const SETS: usize = 30;
-/// Correlation of numbers with their order, or of neighbours, that is no chance, in its standard deviation.
-const NO_CHANCE: f64 = 3.5;
-/// Correlation of neighbouring touches that matters.
-const DEPENDENT: f64 = 0.3;
-
 /// `[separate] plugin = "probing"`.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -150,26 +145,17 @@ fn refuse(points: &Points, problem: String, help: &str) -> Error {
         .help(help.to_owned())
 }
 
-/// The range of numbers as a value, with its interval, and what is to be said of their course.
-fn range_value(symbol: &str, of: &str, about: &str, numbers: &[f64], said: &mut Vec<String>) -> Value {
+/// The range of numbers as a value, with its interval.
+fn range_value(symbol: &str, of: &str, about: &str, numbers: &[f64], said: &mut Said) -> Value {
     let known = of_range(range(numbers), numbers.len(), seed(&["probing", symbol, of]));
     let value = Value::new(symbol, range(numbers), f64::NAN, "um", about).of(of).key();
     if known.is_none() {
-        said.push(format!(
+        said.remarks.push(format!(
             "{symbol} of {of}: all {} are equal: copies, or too coarse a resolution, show no uncertainty",
             numbers.len()
         ));
     }
-    if let Some([trend, neighbours]) = course(numbers) {
-        let chance = NO_CHANCE / (numbers.len() as f64).sqrt();
-        let drifts = trend.abs() > chance.min(0.93);
-        if drifts {
-            let by = numbers[numbers.len() - 1] - numbers[0];
-            said.push(format!("{symbol} of {of}: the touches drift, the last one lies {by:+.2} µm from the first one; the value contains it, the interval does not hold for it"));
-        } else if neighbours > DEPENDENT.max(chance) {
-            said.push(format!("{symbol} of {of}: touches depend on those before (correlation {neighbours:.2}): the interval is too narrow"));
-        }
-    }
+    said.checks.extend(in_order("the touches", &[(of, numbers)], "µm").into_iter().map(|check| check.within(symbol)));
     Value { uncertainty: known, ..value }
 }
 
@@ -177,7 +163,7 @@ impl Probing {
     fn sets(&self, points: &Points) -> Result<Outcome> {
         let names: Vec<&str> = self.axes().iter().map(|(name, _)| *name).collect();
         let touches = Touches::of(points, &names)?;
-        let mut said = Vec::new();
+        let mut said = Said::default();
         let mut values = vec![self.form_value(&touches, &mut said)];
         if self.0.tool_changed {
             if touches.sets.len() < FEWEST {
@@ -198,28 +184,30 @@ impl Probing {
         }
         let count = touches.sets[0].deviations_um.len();
         if self.0.object == Object::Sphere && count < ON_SPHERE {
-            said.push(format!("{count} touches of a sphere: P_FTU,3D is of {ON_SPHERE}; fewer find less of the form"));
+            said.remarks
+                .push(format!("{count} touches of a sphere: P_FTU,3D is of {ON_SPHERE}; fewer find less of the form"));
         }
         let notes = vec![format!("{} sets of {count} touches", touches.sets.len())];
         Ok(Outcome {
             convention: "a deviation is the distance of a touch from the centre of its set less the mean radius".into(),
             tables: vec![rows(&touches)?],
             values,
-            remarks: said,
+            checks: said.checks,
+            remarks: said.remarks,
             notes,
             ..Outcome::default()
         })
     }
 
     /// The range of radial distances, mean over the sets.
-    fn form_value(&self, touches: &Touches, said: &mut Vec<String>) -> Value {
+    fn form_value(&self, touches: &Touches, said: &mut Said) -> Value {
         let (symbol, about) = self.form();
         let count = touches.sets.len();
         let ranges: Vec<f64> = touches.sets.iter().map(ball::Set::range_um).collect();
         let value = mean(&ranges);
         let plain = Value::new(symbol, value, f64::NAN, "um", about).key();
         if count < 2 {
-            said.push("one set of touches: nothing shows its uncertainty; repeat it at the same places, and number the sets in `repeat`".into());
+            said.remarks.push("one set of touches: nothing shows its uncertainty; repeat it at the same places, and number the sets in `repeat`".into());
             return plain;
         }
         let noise = touches.noise_um();
@@ -228,10 +216,14 @@ impl Probing {
         let std = (squares / freedom as f64).sqrt();
         // What two fits of copies differ by is rounding.
         if std < 1e-9 * value.max(1e-3) {
-            said.push("the sets are identical: copies show no uncertainty".into());
+            said.remarks.push("the sets are identical: copies show no uncertainty".into());
             return plain;
         }
-        say_course(&noise, &ranges, said);
+        let names: Vec<String> = (1..=count).map(|set| format!("touch of set {set}:")).collect();
+        let of_sets: Vec<(&str, &[f64])> =
+            names.iter().map(String::as_str).zip(noise.iter().map(Vec::as_slice)).collect();
+        said.checks.extend(in_order("the touches of a set", &of_sets, "µm"));
+        said.checks.extend(in_order("the sets", &[("range of set", &ranges)], "µm"));
         let means = touches.means_um();
         let power = means.iter().map(|one| one * one).sum::<f64>() / (means.len() - touches.fit.rank()) as f64;
         let share = without_noise(power, std * std / count as f64);
@@ -241,8 +233,8 @@ impl Probing {
             touches.fit.remove_from(&mut set);
             range(&set)
         };
-        let error = |machine: Machine, draw: &mut Draw| {
-            let means = if machine == Machine::Least { &least } else { &means };
+        let error = |truth: Truth, draw: &mut Draw| {
+            let means = if truth == Truth::Least { &least } else { &means };
             let std = std * draw.true_std_ratio(freedom);
             let mut mean_of = |sets: usize| (0..sets).map(|_| one_set(means, std, draw)).sum::<f64>() / sets as f64;
             let truth = mean_of(SETS);
@@ -259,7 +251,7 @@ fn single_points(points: &Points) -> Result<Outcome> {
     let mut ids: Vec<&String> = labels.iter().collect();
     ids.sort();
     ids.dedup();
-    let (mut values, mut said) = (Vec::new(), Vec::new());
+    let (mut values, mut said) = (Vec::new(), Said::default());
     let mut each: Vec<(&str, usize, f64)> = Vec::new();
     for id in ids {
         let of: Vec<f64> =
@@ -285,27 +277,10 @@ fn single_points(points: &Points) -> Result<Outcome> {
         convention: "a range is of as many touches as there are".into(),
         tables: vec![TableRows { table: spec.name, rows }],
         values,
-        remarks: said,
+        checks: said.checks,
+        remarks: said.remarks,
         ..Outcome::default()
     })
-}
-
-/// What the user should know of touches that depend on each other, and of sets that change.
-fn say_course(noise: &[Vec<f64>], ranges: &[f64], said: &mut Vec<String>) {
-    let touches: usize = noise.iter().map(Vec::len).sum();
-    let neighbours: Vec<f64> = noise.iter().filter_map(|set| course(set)).map(|[_, neighbours]| neighbours).collect();
-    if !neighbours.is_empty() {
-        let together = mean(&neighbours);
-        if together > DEPENDENT.max(NO_CHANCE / (touches as f64).sqrt()) {
-            said.push(format!("within a set touches depend on those before (correlation {together:.2}): a drift, or a disturbance slower than a touch; the interval is too narrow"));
-        }
-    }
-    if let Some([trend, _]) = course(ranges).filter(|[trend, _]| trend.abs() > 0.93) {
-        let by = ranges[ranges.len() - 1] - ranges[0];
-        said.push(format!(
-            "the range changes from set to set, by {by:+.2} µm from the first to the last one (correlation {trend:.2})"
-        ));
-    }
 }
 
 fn points_table() -> TableSpec {

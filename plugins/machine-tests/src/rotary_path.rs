@@ -12,7 +12,7 @@
 
 use runout_core::{
     Error, ErrorKind, Result,
-    draws::seed,
+    draws::{Draw, Truth, seed},
     fault::Fault,
     pipeline::{Context, StageConfig},
     points::{
@@ -28,7 +28,8 @@ use serde::Deserialize;
 
 use crate::{
     cells::{Cells, Terms, remarks},
-    draws::{Computed, Draw, Machine, with_uncertainty},
+    draws::{Computed, with_uncertainty},
+    repeated,
     runs::Approaches,
 };
 
@@ -156,7 +157,7 @@ impl StageConfig for RotaryPathConfig {
 struct RotaryPath(RotaryPathConfig);
 
 /// Deviations of one ball along one direction.
-struct Course {
+struct BallCourse {
     ball: String,
     direction: &'static str,
     approaches: Approaches,
@@ -175,7 +176,7 @@ const NAMES: [(&str, &str, &str); 4] = [
 ];
 
 impl RotaryPath {
-    fn courses(&self, points: &Points) -> Result<Vec<Course>> {
+    fn courses(&self, points: &Points) -> Result<Vec<BallCourse>> {
         let refuse = |problem: String, help: &str| {
             Error::new("evaluate", points.input.display().to_string(), problem)
                 .of(ErrorKind::UnsuitableData)
@@ -208,7 +209,7 @@ impl RotaryPath {
                 let what = format!("ball {}", ball.id);
                 let approaches = Approaches::of_rows(points, &what, &targets, side.as_deref(), &deviations)?;
                 let cells = Cells::of(&approaches);
-                courses.push(Course { ball: ball.id.clone(), direction: name, approaches, cells });
+                courses.push(BallCourse { ball: ball.id.clone(), direction: name, approaches, cells });
             }
         }
         if courses.is_empty() {
@@ -254,15 +255,15 @@ impl RotaryPath {
         )
     }
 
-    fn rows(&self, courses: &[Course]) -> Result<TableRows> {
+    fn rows(&self, courses: &[BallCourse]) -> Result<TableRows> {
         let spec = self.table();
-        let mut each: Vec<(&Course, usize, usize)> = Vec::new();
+        let mut each: Vec<(&BallCourse, usize, usize)> = Vec::new();
         for course in courses {
             for side in 0..course.approaches.sides.len() {
                 each.extend((0..course.approaches.targets.len()).map(|target| (course, side, target)));
             }
         }
-        let number = |of: &dyn Fn(&Course, usize, usize) -> f64| {
+        let number = |of: &dyn Fn(&BallCourse, usize, usize) -> f64| {
             numbers(each.iter().map(|(course, side, target)| of(course, *side, *target)))
         };
         let rows = spec.rows(vec![
@@ -337,7 +338,7 @@ impl PointSeparator for RotaryPath {
     fn separate(&self, points: &Points) -> Result<Outcome> {
         let courses = self.courses(points)?;
         let test = self.0.test.name();
-        let (mut values, mut said) = (Vec::new(), Vec::new());
+        let (mut values, mut said, mut checks) = (Vec::new(), Vec::new(), Vec::new());
         for course in &courses {
             let (approaches, cells) = (&course.approaches, &course.cells);
             let noise = approaches.noise();
@@ -357,8 +358,8 @@ impl PointSeparator for RotaryPath {
                     least: 0.0,
                 })
                 .collect();
-            let error = |machine: Machine, draw: &mut Draw| {
-                let cells = if machine == Machine::Least { &least } else { cells };
+            let error = |truth: Truth, draw: &mut Draw| {
+                let cells = if truth == Truth::Least { &least } else { cells };
                 let errors = cells.errors(approaches, &noise, 0.0, draw);
                 used.iter().map(|(at, _)| errors[*at]).collect()
             };
@@ -374,6 +375,8 @@ impl PointSeparator for RotaryPath {
             let of = format!("{} {}", course.ball, course.direction);
             let found = remarks(approaches, &noise, &TERMS);
             said.extend(found.into_iter().map(|remark| format!("{of}: {remark}")));
+            let found = repeated::approaches(approaches, &noise.along, ["°", "µm"]);
+            checks.extend(found.into_iter().map(|check| check.within(&of)));
         }
         Ok(Outcome {
             convention: format!(
@@ -381,6 +384,7 @@ impl PointSeparator for RotaryPath {
             ),
             tables: vec![self.rows(&courses)?],
             values,
+            checks,
             remarks: said,
             ..Outcome::default()
         })

@@ -1,14 +1,6 @@
 //! Approaches of target positions: which target, from which side, in which run.
 
-use runout_core::{
-    Error, ErrorKind, Result,
-    consistency::{
-        Check,
-        groups::{Group, Level, alike},
-    },
-    numerics::statistics::median,
-    points::Points,
-};
+use runout_core::{Error, ErrorKind, Result, points::Points};
 
 /// Two targets are one where they differ by less than this share of the travel: commands are written with few digits.
 const SAME_TARGET: f64 = 1e-7;
@@ -23,39 +15,7 @@ pub(crate) struct Approaches {
     pub deviations: Vec<Vec<Vec<f64>>>,
 }
 
-/// A single approach lies off the others of its target by so many standard deviations of all approaches, without the largest.
-const OUTLIER: f64 = 12.0;
-/// Parts of the travel whose scatter is compared.
-const PARTS: usize = 4;
-
 impl Approaches {
-    /// Approaches that are not like the others of their target, in words.
-    pub(crate) fn outliers(&self, own_std: f64, unit: &str, contain: &str) -> Option<String> {
-        let mut farthest = (0.0, String::new());
-        let mut squares = Vec::new();
-        for (target, of_target) in self.targets.iter().zip(&self.deviations) {
-            for (side, runs) in self.sides.iter().zip(of_target) {
-                let middle = median(runs.iter().copied());
-                for (run, deviation) in runs.iter().enumerate() {
-                    let off = deviation - middle;
-                    squares.push(off.abs());
-                    if off.abs() > f64::abs(farthest.0) {
-                        farthest = (off, format!("approach {} of target {target} in direction {side:+}", run + 1));
-                    }
-                }
-            }
-        }
-        // Half of all lie within 0.67 standard deviations.
-        let usual = median(squares) / 0.6745;
-        let (off, place) = farthest;
-        (usual > 0.0 && own_std > 0.0 && off.abs() > OUTLIER * usual).then(|| {
-            format!(
-                "{place} lies {off:+.2} {unit} from the others, {:.0} times what is usual: {contain}",
-                off.abs() / usual
-            )
-        })
-    }
-
     /// Sorts points. Without a column `direction` the side follows from the target before, in the order of the rows.
     ///
     /// # Errors
@@ -123,48 +83,6 @@ impl Approaches {
         self.deviations.iter().flatten().map(Vec::len).min().unwrap_or(0)
     }
 
-    /// Correlation of the deviations at neighbouring targets within a run, without what the whole run is off by.
-    fn neighbours(&self, runs: usize, common: &[f64], along: &[f64]) -> f64 {
-        let (mut products, mut squares) = (0.0, 0.0);
-        let squares_along: f64 = along.iter().map(|place| place * place).sum();
-        for side in 0..self.sides.len() {
-            for (run, level) in common.iter().enumerate().take(runs) {
-                let left = |place: usize| {
-                    let cell = &self.deviations[place][side];
-                    cell[run] - mean(&cell[..runs]) - level
-                };
-                let course: Vec<f64> = (0..along.len()).map(left).collect();
-                let tilt = course.iter().zip(along).map(|(left, place)| left * place).sum::<f64>() / squares_along;
-                let level = mean(&course);
-                let course: Vec<f64> =
-                    course.iter().zip(along).map(|(left, place)| left - level - tilt * place).collect();
-                products += course.windows(2).map(|pair| pair[0] * pair[1]).sum::<f64>();
-                squares += course.iter().map(|left| left * left).sum::<f64>();
-            }
-        }
-        // Level and tilt are taken out: independent deviations have this correlation on average.
-        let count = along.len() as f64;
-        let usual = if count > 2.0 { -(2.0 - 4.0 / count) / (count - 2.0) } else { 0.0 };
-        if squares > 0.0 { products / squares - usual } else { 0.0 }
-    }
-
-    /// Whether approaches scatter alike in all parts of the travel, beside what a whole run is off by: their mean scatter decides how well
-    /// each value is known.
-    pub(crate) fn alike(&self, noise: &Noise, unit: &str) -> Vec<Check> {
-        let each = self.targets.len().div_ceil(PARTS);
-        let group = |(targets, deviations): (&[f64], &[Vec<Vec<f64>>])| {
-            let of_side = |runs: &Vec<f64>| {
-                let mean = mean(&runs[..noise.runs]);
-                runs.iter().zip(&noise.course).map(|(one, level)| (one - mean - level).powi(2)).sum::<f64>()
-            };
-            let freedom = (deviations.iter().flatten().count() * (noise.runs - 1)) as f64;
-            let name = format!("the travel from {} to {} {unit}", targets[0], targets[targets.len() - 1]);
-            Group { name, squares: deviations.iter().flatten().map(of_side).sum(), freedom }
-        };
-        let parts = self.targets.chunks(each).zip(self.deviations.chunks(each));
-        alike("parts", &parts.map(group).collect::<Vec<Group>>(), Level::Others, "its approaches are copies")
-    }
-
     /// What changes from run to run.
     pub(crate) fn noise(&self) -> Noise {
         let runs = self.fewest_runs();
@@ -197,7 +115,6 @@ impl Approaches {
                 .iter()
                 .flatten()
                 .all(|runs| runs.iter().all(|one| one.to_bits() == runs[0].to_bits())),
-            neighbours: self.neighbours(runs, &common, &along),
             common_std: of_runs(common.iter().map(|level| level * level).sum()),
             slope_std: of_runs(slope),
             own_std: (own / freedom_own as f64).sqrt(),
@@ -223,8 +140,6 @@ pub(crate) struct Noise {
     pub freedom_own: usize,
     /// Whether the runs are equal, digit by digit.
     pub copies: bool,
-    /// Correlation at neighbouring targets within a run.
-    pub neighbours: f64,
 }
 
 impl Noise {

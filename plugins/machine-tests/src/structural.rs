@@ -23,7 +23,8 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use crate::{
-    probing::{course, range},
+    probing::range,
+    repeated::{Said, means_in_order},
     runs::{mean, std},
 };
 
@@ -33,9 +34,6 @@ const FEWEST_READINGS: usize = 20;
 const FEWEST_WINDOWS: usize = 5;
 /// Share of the readings of the fullest window that a window has at least.
 const FILLED: f64 = 0.9;
-/// Correlation of windows that is no chance, in its standard deviation.
-const NO_CHANCE: f64 = 3.0;
-
 /// `[separate] plugin = "structural-motion"`.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -113,7 +111,7 @@ impl PointSeparator for StructuralMotion {
     fn separate(&self, points: &Points) -> Result<Outcome> {
         let windows = windows(points, self.0.window_s)?;
         let time = points.column("time_s")?;
-        let (mut values, mut said, mut each) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut values, mut said, mut each) = (Vec::new(), Said::default(), Vec::new());
         for (column, axis) in AXES {
             let Ok(readings) = points.column(column) else { continue };
             let ranges: Vec<f64> =
@@ -135,7 +133,8 @@ impl PointSeparator for StructuralMotion {
             convention: "displacement of the tool against the workpiece, spindle still; as recorded, with what the sensors themselves make".into(),
             tables: vec![TableRows { table: spec.name, rows }],
             values,
-            remarks: said,
+            checks: said.checks,
+            remarks: said.remarks,
             notes: vec![format!("{} windows of {} s", windows.len(), self.0.window_s)],
             ..Outcome::default()
         })
@@ -143,34 +142,25 @@ impl PointSeparator for StructuralMotion {
 }
 
 impl StructuralMotion {
-    fn values(&self, axis: &str, ranges: &[f64], said: &mut Vec<String>) -> [Value; 2] {
+    fn values(&self, axis: &str, ranges: &[f64], said: &mut Said) -> [Value; 2] {
         let count = ranges.len();
         let about =
             format!("peak to valley within {} s, mean of the windows, spindle still (ISO 230-7)", self.0.window_s);
         let mut value = Value::new("structural-motion", mean(ranges), f64::NAN, "um", &about).of(axis).key();
         if count < FEWEST_WINDOWS {
-            said.push(format!(
+            said.remarks.push(format!(
                 "{axis}: {count} windows show no uncertainty: record {FEWEST_WINDOWS} or more of {} s",
                 self.0.window_s
             ));
         } else if std(ranges) > 0.0 {
-            let error = std(ranges) / (count as f64).sqrt();
+            let judged = means_in_order("the windows", &[(&format!("{axis}: window"), ranges)], "µm");
+            let error = judged.factors[0] * std(ranges) / (count as f64).sqrt();
+            said.checks.extend(judged.checks.into_iter().map(|check| check.within(axis)));
             let reach = student_95((count - 1) as f64) * error;
             let interval = [(value.value - reach).max(0.0), value.value + reach];
             value.uncertainty = Some(Uncertainty::new(error, interval, 0));
         } else {
-            said.push(format!("{axis}: all windows have the same peak to valley: copies, or too coarse a resolution, show no uncertainty"));
-        }
-        if let Some([trend, neighbours]) = course(ranges) {
-            let chance = NO_CHANCE / (count as f64).sqrt();
-            if trend.abs() > chance.min(0.93) {
-                let by = ranges[count - 1] - ranges[0];
-                said.push(format!(
-                    "{axis}: the motion changes over the recording, by {by:+.3} µm from the first to the last window"
-                ));
-            } else if neighbours > chance {
-                said.push(format!("{axis}: windows depend on those before (correlation {neighbours:.2}): the interval is too narrow; record longer"));
-            }
+            said.remarks.push(format!("{axis}: all windows have the same peak to valley: copies, or too coarse a resolution, show no uncertainty"));
         }
         let largest = ranges.iter().copied().fold(0.0, f64::max);
         let about = format!(

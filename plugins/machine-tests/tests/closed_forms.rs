@@ -4,6 +4,7 @@
 
 use runout_core::{
     Result,
+    consistency::Check,
     pipeline::{Context, StageConfig},
     points::{Column, Points},
     stage::{Outcome, Separator},
@@ -164,5 +165,7 @@ fn an_unknown_scale_is_in_the_interval() {
     let mut odd = columns.clone();
     odd[1].1[37] += 1000.0;
     let odd = outcome(positioning(), &odd).unwrap();
-    assert!(odd.remarks.iter().any(|remark| remark.contains("times what is usual")), "{:?}", odd.remarks);
+    let named =
+        |check: &Check| check.refutes() && check.finding.contains("of target") && check.finding.contains("is off by");
+    assert!(odd.checks.iter().any(named), "{:?}", odd.checks);
 }

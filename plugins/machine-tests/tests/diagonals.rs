@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
+use runout_core::consistency::Check;
 use runout_machine_tests::{DiagonalsConfig, PositioningConfig};
 
 use crate::support::{Chance, Held, Rows, separated, value};
@@ -203,7 +204,7 @@ fn what_cannot_be_evaluated_is_refused_and_what_is_odd_is_said() {
     let found = separated(config(0.0), &drifting).unwrap();
     assert!(found.remarks.iter().any(|remark| remark.starts_with("PPP: the runs drift")), "{:?}", found.remarks);
     let quiet = separated(config(0.0), &rows).unwrap();
-    assert!(quiet.remarks.iter().all(|remark| !remark.contains("neighbouring targets")), "{:?}", quiet.remarks);
+    assert!(!quiet.checks.iter().any(Check::refutes), "{:?}", quiet.checks);
     let mut slow = rows.clone();
     let mut chance = Chance::new(8);
     let mut last = 0.0;
@@ -212,8 +213,8 @@ fn what_cannot_be_evaluated_is_refused_and_what_is_odd_is_said() {
         *one += last;
     }
     let found = separated(config(0.0), &slow).unwrap();
-    let said = found.remarks.iter().filter(|remark| remark.contains("neighbouring targets")).count();
-    assert!(said >= 2, "{:?}", found.remarks);
+    let depends = |check: &&Check| check.refutes() && check.finding.contains("depend on each other along the travel");
+    assert!(found.checks.iter().filter(depends).count() >= 2, "{:?}", found.checks);
     let mut three = Rows::new("diagonal", &NAMES);
     for (row, text) in rows.texts.iter().enumerate().filter(|(_, text)| *text != "PPN") {
         three.push(text, &[0, 1, 2].map(|column: usize| rows.numbers[column][row]));

@@ -43,7 +43,6 @@ fn a_window_has_its_peak_to_valley() {
     assert!((motion.std().unwrap() - expected).abs() < 1e-12);
     assert!((motion.interval_95().unwrap()[1] - 3.5 - 2.571 * expected).abs() < 1e-3);
     assert!((value(&found, "structural-motion-max", "X").value - 6.0).abs() < 1e-12);
-    assert!(found.remarks.iter().any(|remark| remark.starts_with("X: the motion changes")), "{:?}", found.remarks);
     assert!(
         found.remarks.iter().any(|remark| remark.starts_with("Z: all windows have the same")),
         "{:?}",

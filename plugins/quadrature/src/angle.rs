@@ -31,7 +31,7 @@ pub(crate) struct Correction {
 }
 
 /// A component that was found: what the radius has of it, and the variance of that.
-struct Found {
+struct FoundComponent {
     component: Component,
     waves: [f64; 2],
     variance: [f64; 2],
@@ -49,13 +49,13 @@ impl Correction {
             let parameters = <[f64; 2]>::try_from(values).ok()?;
             let slopes = component.slopes(radius, parameters);
             let known = |index: usize| variance.get(index).copied().filter(|entry| entry.is_finite()).unwrap_or(0.0);
-            Some(Found {
+            Some(FoundComponent {
                 component,
                 waves: component.waves(radius, parameters),
                 variance: [0, 1].map(|wave| (0..2).map(|index| known(index) * slopes[index][wave].powi(2)).sum()),
             })
         });
-        let found: Vec<Found> = found.collect();
+        let found: Vec<FoundComponent> = found.collect();
         let mut correction = Self {
             signal: Signal { radius, components: Vec::new() },
             undecided_variance: 0.0,
@@ -65,7 +65,7 @@ impl Correction {
             undecided: Vec::new(),
         };
         if samples.true_rad.is_some() {
-            for Found { component, waves, variance } in &found {
+            for FoundComponent { component, waves, variance } in &found {
                 correction.signal.components.push((*component, component.of_radius(*waves)));
                 correction.decided_variance += 0.5 * variance.iter().sum::<f64>();
             }

@@ -16,7 +16,7 @@ use crate::{
     campaign::Campaign,
     config::{Curves, SpatialErrorConfig},
     likelihood::{Criterion, estimate},
-    solve::{Found, Solution, complete, independent, prior},
+    solve::{CovarianceFit, Solution, complete, independent, prior},
     terms::{Between, Term, Volume},
     whole::Whole,
 };
@@ -137,7 +137,8 @@ fn refit(
         Some(estimate) => estimate.covariances.clone(),
         None => solution.covariances.clone(),
     };
-    complete(campaign, config, Found { estimate: estimated, guesses: Vec::new(), covariances, terms, lost }).ok()
+    complete(campaign, config, CovarianceFit { estimate: estimated, guesses: Vec::new(), covariances, terms, lost })
+        .ok()
 }
 
 /// Places over the measured volume (Halton's sequence), within the hull; the measured ones where that leaves few.

@@ -26,7 +26,7 @@ use crate::{
     solve::{Solution, families, prior, solve},
     suspects::{Group, groups},
     terms::Term,
-    trace::{Found, Tracing, is_observable},
+    trace::{TracedEffect, Tracing, is_observable},
 };
 
 /// Effects at most.
@@ -72,11 +72,12 @@ impl PointModel for SpatialError {
         let most = if is_sound { settings.max_added.min(MOST_ADDED) } else { 0 };
         let found = tracing.run(most).unwrap_or_default();
         let Tracing { doubts, mut candidates, .. } = tracing;
-        let (added, strangers): (Vec<Found>, Vec<Found>) = found.into_iter().partition(Found::is_added);
+        let (added, strangers): (Vec<TracedEffect>, Vec<TracedEffect>) =
+            found.into_iter().partition(TracedEffect::is_added);
         let mut chosen: Vec<Candidate> = added.iter().map(|found| candidates[found.members[0]].clone()).collect();
         let after = if chosen.is_empty() { before.clone() } else { settled(&campaign, self, &mut chosen)? };
         added.iter().zip(chosen).for_each(|(found, chosen)| candidates[found.members[0]] = chosen);
-        let terms_of = |found: &Found| candidates[found.members[0]].terms.clone();
+        let terms_of = |found: &TracedEffect| candidates[found.members[0]].terms.clone();
         let terms: Vec<Term> = added.iter().flat_map(terms_of).collect();
         let name = |candidate: &Candidate| {
             let effect = &effects[candidate.effect];
@@ -230,7 +231,7 @@ impl SpatialError {
     fn steps(
         &self,
         campaign: &Campaign,
-        added: &[Found],
+        added: &[TracedEffect],
         candidates: &[Candidate],
         levels: &[Level; 2],
     ) -> Result<Vec<Level>> {

@@ -171,7 +171,7 @@ pub(crate) fn solve(campaign: &Campaign, config: &SpatialErrorConfig, added: &[T
     if let Some(covariance) = config.kriging.fixed() {
         no_contradiction(campaign, &covariance)?;
         let (guesses, covariances) = (Vec::new(), vec![covariance; campaign.measured.len()]);
-        return complete(campaign, config, Found { estimate: None, guesses, covariances, terms, lost });
+        return complete(campaign, config, CovarianceFit { estimate: None, guesses, covariances, terms, lost });
     }
     let some = estimated_from(campaign);
     let data = campaign.data(&terms, some.as_deref());
@@ -184,11 +184,11 @@ pub(crate) fn solve(campaign: &Campaign, config: &SpatialErrorConfig, added: &[T
     })?;
     let covariances = estimate.covariances.clone();
     let estimate = Some(estimate);
-    complete(campaign, config, Found { estimate, guesses, covariances, terms, lost })
+    complete(campaign, config, CovarianceFit { estimate, guesses, covariances, terms, lost })
 }
 
 /// Covariances and columns, without the fit of all places.
-pub(crate) struct Found {
+pub(crate) struct CovarianceFit {
     /// Estimation of the covariances.
     pub estimate: Option<Estimate>,
     /// The best estimate of each family that was tried, of each field.
@@ -205,8 +205,8 @@ pub(crate) struct Found {
 ///
 /// # Errors
 /// When a covariance has no positive definite matrix.
-pub(crate) fn complete(campaign: &Campaign, config: &SpatialErrorConfig, found: Found) -> Result<Solution> {
-    let Found { estimate, guesses, covariances, terms, lost } = found;
+pub(crate) fn complete(campaign: &Campaign, config: &SpatialErrorConfig, found: CovarianceFit) -> Result<Solution> {
+    let CovarianceFit { estimate, guesses, covariances, terms, lost } = found;
     let count = campaign.places_mm.len();
     let by_neighbours = count > config.kriging.full_places;
     let data = campaign.data(&terms, None);

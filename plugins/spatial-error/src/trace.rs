@@ -49,7 +49,7 @@ pub(crate) struct Gain {
 
 /// Something found: a candidate or a jump, with what it is not distinguished from.
 #[derive(Debug, Clone)]
-pub(crate) struct Found {
+pub(crate) struct TracedEffect {
     /// Indices of candidates, the best first; of the jump alone.
     pub members: Vec<usize>,
     /// Whether it is a jump.
@@ -60,7 +60,7 @@ pub(crate) struct Found {
     pub gain: Gain,
 }
 
-impl Found {
+impl TracedEffect {
     /// Whether it is added to the model.
     pub(crate) fn is_added(&self) -> bool {
         !self.jump && self.undecided.is_none()
@@ -97,7 +97,7 @@ pub(crate) struct Tracing<'a> {
 /// A state of the search.
 #[derive(Clone)]
 pub(crate) struct State {
-    pub found: Vec<Found>,
+    pub found: Vec<TracedEffect>,
     /// Of each component.
     families: Vec<Family>,
     pub estimate: Estimate,
@@ -124,7 +124,7 @@ impl<'a> Tracing<'a> {
     }
 
     /// Looks for at most so many effects.
-    pub(crate) fn run(&mut self, most: usize) -> Option<Vec<Found>> {
+    pub(crate) fn run(&mut self, most: usize) -> Option<Vec<TracedEffect>> {
         let start = self.start()?;
         let with_jumps = self.follow(start.clone(), most, true);
         if !with_jumps.found.iter().any(|found| found.jump) {
@@ -139,7 +139,7 @@ impl<'a> Tracing<'a> {
         // An unknown place counts as three more numbers each.
         let jumps = with_jumps.found.iter().filter(|found| found.jump).count() as f64;
         let better = total(&with_jumps) + 3.0 * jumps * self.count().ln() < total(&effects);
-        let is_step = |found: &Found| matches!(self.candidates[found.members[0]].shape, Shape::From(_));
+        let is_step = |found: &TracedEffect| matches!(self.candidates[found.members[0]].shape, Shape::From(_));
         let same = with_jumps.found.iter().any(|found| found.jump && found.undecided.is_some());
         let better = better || (same && effects.found.iter().any(is_step));
         Some(if better { with_jumps.found } else { effects.found })
@@ -151,11 +151,11 @@ impl<'a> Tracing<'a> {
         (self.campaign.measured.len() * places) as f64
     }
 
-    fn terms_of(&self, found: &Found) -> &[Term] {
+    fn terms_of(&self, found: &TracedEffect) -> &[Term] {
         self.columns(found.members[0], found.jump)
     }
 
-    pub(crate) fn terms(&self, found: &[Found]) -> Vec<Term> {
+    pub(crate) fn terms(&self, found: &[TracedEffect]) -> Vec<Term> {
         self.declared
             .iter()
             .copied()
@@ -285,7 +285,7 @@ impl<'a> Tracing<'a> {
             members.extend(alike.map(|trial| trial.1).filter(|other| left(*other).left(0, 1) < LEFT));
         }
         let mut found = state.found.clone();
-        found.push(Found { members, jump, undecided, gain });
+        found.push(TracedEffect { members, jump, undecided, gain });
         Some(State { found, families: state.families.clone(), estimate })
     }
 

@@ -10,7 +10,7 @@ use std::sync::{Arc, OnceLock};
 
 use runout_core::{
     Error, ErrorKind, Result,
-    closed_loop::{Bias, Effect, Fit, Model, Outcome, Remainder, Setting, diagnosis::Unexplained, tested::Tested},
+    closed_loop::{Bias, Effect, Fit, LookedAt, Model, Remainder, Setting, diagnosis::Unexplained, tested::Tested},
     consistency::Check,
     numerics::least_squares::Basis,
 };
@@ -313,7 +313,7 @@ impl Fit for TracesFit {
     }
 
     /// Left to who has the final straightness.
-    fn values(&self) -> Vec<Outcome> {
+    fn values(&self) -> Vec<LookedAt> {
         Vec::new()
     }
 

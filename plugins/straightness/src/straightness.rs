@@ -3,8 +3,8 @@
 use runout_core::{
     Result,
     consistency::Check,
+    draws::OpenErrors,
     stage::{Evaluable, OpenProfile, Outcome},
-    standards::open_errors::OpenErrors,
     summary::Value,
     table::{ColumnSpec, Figure, Measure, TableRows, TableSpec, numbers},
 };

@@ -10,7 +10,7 @@ use rand_distr::{Distribution, Normal};
 use runout_core::{
     points::{Column, Points, Trace},
     stage::{Evaluable, PointSeparator},
-    standards::{drawn::Sensitivity, straightness::Straightness as Values},
+    standards::straightness::Straightness as Values,
 };
 use runout_straightness::{AxialReversal, AxialReversalConfig, Straightness};
 
@@ -191,9 +191,9 @@ fn the_stated_uncertainty_covers_the_truth() {
 #[test]
 fn intervals_of_the_standards_values_hold_the_truth() {
     let z = even(0.0, 1.0, 121);
-    let look = |deviation_um: &[f64]| {
+    let look = |deviation_um: &[f64], values: &mut Vec<f64>| {
         let found = Values::of(&z, deviation_um);
-        vec![found.strt_lsli_um, found.strt_mzli_um, found.strq_um]
+        values.extend([found.strt_lsli_um, found.strt_mzli_um, found.strq_um]);
     };
     for noise_um in [0.004, 0.04] {
         let mut random = ChaCha8Rng::seed_from_u64(11);
@@ -213,13 +213,12 @@ fn intervals_of_the_standards_values_hold_the_truth() {
             for (evaluable, (held, truth)) in outcome.evaluables.iter().zip(held.iter_mut().zip([part, slide])) {
                 let Evaluable::OpenProfile(profile) = evaluable else { panic!("{evaluable:?}") };
                 let errors = profile.errors.as_ref().unwrap();
-                let drawn = errors.drawn(&profile.deviation_um, 64, campaign, look).unwrap();
-                let (found, truth) = (look(&profile.deviation_um), look(&without_line(&z, truth)));
-                for (value, sensitivity) in
-                    [Sensitivity::Extreme, Sensitivity::Extreme, Sensitivity::Mean].into_iter().enumerate()
-                {
-                    let [low, high] = drawn.uncertainty(value, found[value], sensitivity).unwrap().interval_95;
-                    held[value] += usize::from(low <= truth[value] && truth[value] <= high);
+                let known = errors.values(&profile.deviation_um, campaign, look).unwrap();
+                let mut truths = Vec::new();
+                look(&without_line(&z, truth), &mut truths);
+                for ((held, known), truth) in held.iter_mut().zip(known).zip(truths) {
+                    let [low, high] = known.uncertainty.unwrap().interval_95;
+                    *held += usize::from(low <= truth && truth <= high);
                 }
             }
         }

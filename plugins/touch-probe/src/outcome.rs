@@ -26,7 +26,7 @@ use crate::{
 const DIRECTIONS: usize = 60;
 
 /// What a result is made of.
-pub(crate) struct Found<'a> {
+pub(crate) struct TouchSolution<'a> {
     pub config: &'a TouchProbeConfig,
     pub touches: &'a Touches,
     pub fit: &'a Fitted,
@@ -34,7 +34,7 @@ pub(crate) struct Found<'a> {
     pub ranges: Ranges,
 }
 
-impl Found<'_> {
+impl TouchSolution<'_> {
     /// Orders that are lost: of lobing (order 1 always), and of form.
     pub(crate) fn lost(&self, lobes: &[Lobe]) -> [Vec<usize>; 2] {
         let lobing = lobes.iter().filter(|lobe| !lobe.observable).map(|lobe| lobe.order);
@@ -248,17 +248,12 @@ impl Found<'_> {
             unknowns: vec![Quantity::Form(0)],
             estimate,
             variance,
-            motion_covariance: None,
-            form_covariance: None,
             freedom: match self.weights.noise {
                 Noise::Stated => 0,
                 Noise::Repeats(dof) => dof,
                 Noise::Residual => self.fit.solved.dof,
             },
-            equivalents: Vec::new(),
-            form_bound: Vec::new(),
             observable,
-            motion_z_mm: 0.0,
             residual: Residual {
                 rms_um,
                 expected_rms_um: expected,
@@ -266,7 +261,7 @@ impl Found<'_> {
                 dof: self.fit.solved.dof,
                 ..Residual::default()
             },
-            warnings: Vec::new(),
+            ..Separation::default()
         };
         Some(Form { sections: vec![separation], radius_mm: self.config.ring_radius_mm })
     }

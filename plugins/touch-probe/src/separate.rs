@@ -21,7 +21,7 @@ use crate::{
     effects::{Missing, missing},
     held_out::ranges,
     noise::weights,
-    outcome::Found,
+    outcome::TouchSolution,
     tables::{residual_rows, tables},
     touches::Touches,
 };
@@ -273,7 +273,7 @@ impl TouchProbe {
         let Prepared { touches, weights } = prepared;
         let checks = fit.judge(&self.0, touches, weights);
         let ranges = ranges(&self.0, touches, missing, content, readings_um, weights);
-        let mut outcome = Found { config: &self.0, touches, fit: &fit, weights, ranges }.outcome()?;
+        let mut outcome = TouchSolution { config: &self.0, touches, fit: &fit, weights, ranges }.outcome()?;
         let refuted = refuted_by(&checks);
         outcome.values = outcome.values.into_iter().map(|value| value.refuted_by(refuted.clone())).collect();
         outcome.checks = checks;

@@ -75,14 +75,14 @@ impl Layout {
 }
 
 /// The operators that a formula gave.
-struct Found {
+struct Answered {
     /// `[order][unknown][reading]` from order 2; rows that are not given are those of least squares.
     operators: Vec<Vec<Complex64>>,
     /// Whether the formula gives an unknown, `[order][unknown]`.
     given: Vec<Vec<bool>>,
 }
 
-impl Found {
+impl Answered {
     fn at<T>(all: &[T], order: usize) -> Option<&T> {
         all.get(order.checked_sub(FIRST_ORDER)?)
     }
@@ -98,12 +98,12 @@ struct Formula {
     object: Arc<Object>,
     layout: layout::Layout,
     rig: Rig,
-    found: Mutex<Arc<Found>>,
+    found: Mutex<Arc<Answered>>,
 }
 
 impl Formula {
     /// Its operators to an order; asked for again only when a higher order is wanted than before.
-    fn found(&self, max_order: usize) -> Option<Arc<Found>> {
+    fn found(&self, max_order: usize) -> Option<Arc<Answered>> {
         let mut found = self.found.lock().unwrap_or_else(PoisonError::into_inner);
         if found.operators.len() + FIRST_ORDER <= max_order {
             *found = Arc::new(self.object.ask(|py, plugin| self.call(py, plugin, max_order))?);
@@ -111,13 +111,13 @@ impl Formula {
         Some(Arc::clone(&found))
     }
 
-    fn call(&self, py: Python<'_>, plugin: &Bound<'_, PyAny>, max_order: usize) -> PyResult<Found> {
+    fn call(&self, py: Python<'_>, plugin: &Bound<'_, PyAny>, max_order: usize) -> PyResult<Answered> {
         let method = format!("{}.operator", self.object.name);
         let returned = plugin.call_method1("operator", (Layout::new(py, &self.layout, &self.rig, max_order)?,))?;
         let (unknowns, readings) = (self.layout.unknowns.len(), self.layout.readings.len());
         let shape = [max_order + 1 - FIRST_ORDER, unknowns, readings];
         let array = numbers(&returned, &method, "[order, unknown, reading]", &shape)?;
-        let mut found = Found { operators: Vec::with_capacity(shape[0]), given: Vec::with_capacity(shape[0]) };
+        let mut found = Answered { operators: Vec::with_capacity(shape[0]), given: Vec::with_capacity(shape[0]) };
         for (order, own) in (FIRST_ORDER..).zip(array.as_slice()?.chunks(unknowns * readings)) {
             if own.iter().any(|entry| entry.re.is_infinite() || entry.im.is_infinite()) {
                 let problem = format!(
@@ -162,7 +162,7 @@ struct Shared(Arc<Formula>);
 
 impl ClosedForm for Shared {
     fn operator(&self, _layout: &layout::Layout, order: usize) -> Option<Vec<Complex64>> {
-        Found::at(&self.0.found(order)?.operators, order).cloned()
+        Answered::at(&self.0.found(order)?.operators, order).cloned()
     }
 }
 
@@ -184,7 +184,7 @@ impl OwnSeparator {
     ) -> std::result::Result<Self, Fault> {
         let mut formula = None;
         let solving = config.build(context, object.name, |rig, layout| {
-            let found = Mutex::new(Arc::new(Found { operators: Vec::new(), given: Vec::new() }));
+            let found = Mutex::new(Arc::new(Answered { operators: Vec::new(), given: Vec::new() }));
             let made = Formula { object: Arc::clone(object), layout: layout.clone(), rig: rig.clone(), found };
             let made = formula.insert(Arc::new(made));
             Ok(Box::new(Shared(Arc::clone(made))))
@@ -193,7 +193,7 @@ impl OwnSeparator {
         Ok(Self { solving, formula })
     }
 
-    fn found(&self, operation: &'static str, station: &Station) -> Result<Arc<Found>> {
+    fn found(&self, operation: &'static str, station: &Station) -> Result<Arc<Answered>> {
         let max_order = station.profiles.iter().map(runout_core::profile::Profile::max_order).max().unwrap_or_default();
         self.formula.found(max_order).ok_or_else(|| self.formula.failure(operation, station))
     }
@@ -206,7 +206,7 @@ impl StationSeparator for OwnSeparator {
         let mut assessment = self.solving.assess(max_order)?;
         let (layout, readings) = (&self.formula.layout, self.formula.layout.readings.len());
         for assessed in &mut assessment.orders {
-            let Some(operator) = Found::at(&found.operators, assessed.order) else { continue };
+            let Some(operator) = Answered::at(&found.operators, assessed.order) else { continue };
             let mut rows = operator.clone();
             layout.to_reference(layout.mean_z_mm).apply(&mut rows);
             for (unknown, row) in rows.chunks(readings).enumerate() {

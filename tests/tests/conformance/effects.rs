@@ -13,7 +13,7 @@ use runout_spindle::{diagnose::SpindleModel, effects, layout::Layout, selection:
 use crate::{
     campaign::Campaign,
     changed::Change,
-    table::{Check, Found, Kind},
+    table::{Check, Kind, TestOutcome},
 };
 
 /// Ids of effects, and whether the partials of one at a target are differences.
@@ -38,7 +38,7 @@ pub(crate) fn test(registry: &Arc<Registry>) -> Kind {
     let plugins = registry.effects.iter().map(|effect| {
         let partials = match &partials {
             Ok(partials) => of_effect(effect, partials),
-            Err(why) => Found::Fails(why.clone()),
+            Err(why) => TestOutcome::Fails(why.clone()),
         };
         (effect.name.to_owned(), vec![declared(effect).into(), partials])
     });
@@ -64,16 +64,16 @@ fn declared(effect: &EffectEntry) -> Result<(), String> {
     wrong.map_or(Ok(()), |parameter| Err(format!("the parameter {parameter:?}")))
 }
 
-fn of_effect(effect: &EffectEntry, partials: &Partials) -> Found {
+fn of_effect(effect: &EffectEntry, partials: &Partials) -> TestOutcome {
     let mut own = partials.iter().filter(|(id, _)| id == effect.name).peekable();
     if own.peek().is_some() {
-        return own.find_map(|(_, found)| found.clone().err()).map_or(Found::Holds, Found::Fails);
+        return own.find_map(|(_, found)| found.clone().err()).map_or(TestOutcome::Holds, TestOutcome::Fails);
     }
     if effect.parameters.is_empty() {
-        return Found::Exempt("it is there or not: there is no parameter".into());
+        return TestOutcome::Exempt("it is there or not: there is no parameter".into());
     }
     let of_turns = effects::all().iter().any(|known| known.about().id == effect.name);
-    Found::Exempt(if of_turns {
+    TestOutcome::Exempt(if of_turns {
         "this station has no place for it; `plugins/spindle/tests` has".into()
     } else {
         "its partials are columns that only its domain sees: the domain's tests compare them".into()

@@ -16,7 +16,7 @@ use toml::{Table, Value};
 use crate::{
     campaign::{self, Campaign},
     changed::{Between, Change, Taken},
-    table::{Check, Found, Kind, on_two_threads},
+    table::{Check, Kind, TestOutcome, on_two_threads},
 };
 
 const CHECKS: [Check; 5] = [
@@ -37,12 +37,12 @@ pub(crate) fn test(registry: &Arc<Registry>) -> Kind {
         plugins: on_two_threads(names, |plugin| {
             let elsewhere = campaigns.get(plugin).and_then(|table| table.get("elsewhere")).and_then(Value::as_str);
             if let Some(why) = elsewhere {
-                return CHECKS.iter().map(|_| Found::Exempt(why.to_owned())).collect();
+                return CHECKS.iter().map(|_| TestOutcome::Exempt(why.to_owned())).collect();
             }
             let exporter = Exported::new(&campaigns, plugin, registry);
             let found = CHECKS.iter().map(|check| match &exporter {
                 Ok(exporter) => exporter.found(check.0),
-                Err(why) => Found::Fails(why.clone()),
+                Err(why) => TestOutcome::Fails(why.clone()),
             });
             found.collect()
         }),
@@ -82,11 +82,11 @@ impl Exported {
         Ok(Self { campaign, text: text.to_string(), folder, exempt })
     }
 
-    fn found(&self, check: &str) -> Found {
+    fn found(&self, check: &str) -> TestOutcome {
         match (self.exempt.get(check).and_then(Value::as_str), self.check(check)) {
             (None, found) => found.into(),
-            (Some(_), Ok(())) => Found::Fails("it holds: take away the exemption".into()),
-            (Some(why), Err(_)) => Found::Exempt(why.to_owned()),
+            (Some(_), Ok(())) => TestOutcome::Fails("it holds: take away the exemption".into()),
+            (Some(why), Err(_)) => TestOutcome::Exempt(why.to_owned()),
         }
     }
 

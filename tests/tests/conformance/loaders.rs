@@ -19,7 +19,7 @@ use toml::{Table, Value};
 
 use crate::{
     campaign, made,
-    table::{Check, Found, Kind, on_two_threads},
+    table::{Check, Kind, TestOutcome, on_two_threads},
 };
 
 const CHECKS: [Check; 5] = [
@@ -64,15 +64,15 @@ pub(crate) fn test(registry: &Arc<Registry>) -> Kind {
     }
 }
 
-fn all(campaigns: &Table, plugin: &str, registry: &Registry) -> Vec<Found> {
+fn all(campaigns: &Table, plugin: &str, registry: &Registry) -> Vec<TestOutcome> {
     let keys = campaign::campaign_of(campaigns, "load", plugin)
         .and_then(|table| table.try_into::<Reading>().map_err(|error| error.to_string()));
     let elsewhere = keys.as_ref().ok().and_then(|keys| keys.elsewhere.clone());
     let loaded = keys.and_then(|keys| Loaded::new(keys, plugin, registry));
     let found = CHECKS.iter().map(|check| match (&elsewhere, &loaded) {
-        (Some(why), _) => Found::Exempt(why.clone()),
+        (Some(why), _) => TestOutcome::Exempt(why.clone()),
         (None, Ok(loaded)) => loaded.check(check.0),
-        (None, Err(why)) => Found::Fails(why.clone()),
+        (None, Err(why)) => TestOutcome::Fails(why.clone()),
     });
     found.collect()
 }
@@ -104,13 +104,13 @@ impl<'a> Loaded<'a> {
         Ok(Self { text: text.to_string(), name, bytes, folder, registry })
     }
 
-    fn check(&self, check: &str) -> Found {
+    fn check(&self, check: &str) -> TestOutcome {
         match check {
             "equal" => self.twice(false).into(),
             "stations" => match self.written(&self.bytes).and_then(|()| self.is_of_points()) {
-                Ok(true) => Found::Exempt("it gives points".into()),
+                Ok(true) => TestOutcome::Exempt("it gives points".into()),
                 Ok(false) => self.twice(true).into(),
-                Err(why) => Found::Fails(why),
+                Err(why) => TestOutcome::Fails(why),
             },
             "missing" => self.is_missing().into(),
             "cut" => {

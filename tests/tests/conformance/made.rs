@@ -47,6 +47,29 @@ pub(crate) fn points(name: &str) -> String {
                 }
             }
         }
+        // Diagonals, edges and centre lines of a plate of 400 mm x 300 mm, in steps of 50 mm.
+        "plate" => {
+            text.push_str("line,from_x_mm,from_y_mm,to_x_mm,to_y_mm,slope_urad\n");
+            let height_um = |[x, y]: [f64; 2]| 2.0 * (x / 90.0).cos() + 1.5 * (x - y).powi(2) / 4e4;
+            for (line, [x0, y0, x1, y1]) in [
+                ("AC", [0.0, 0.0, 400.0, 300.0]),
+                ("BD", [400.0, 0.0, 0.0, 300.0]),
+                ("AB", [0.0, 0.0, 400.0, 0.0]),
+                ("BC", [400.0, 0.0, 400.0, 300.0]),
+                ("CD", [400.0, 300.0, 0.0, 300.0]),
+                ("DA", [0.0, 300.0, 0.0, 0.0]),
+                ("EG", [200.0, 0.0, 200.0, 300.0]),
+                ("HF", [0.0, 150.0, 400.0, 150.0]),
+            ] {
+                let steps = (f64::hypot(x1 - x0, y1 - y0) / 50.0).round();
+                let at = |step: f64| [x0 + (x1 - x0) * step / steps, y0 + (y1 - y0) * step / steps];
+                for step in 0..steps as usize {
+                    let [from, to] = [at(step as f64), at(step as f64 + 1.0)];
+                    let slope = 20.0 * (height_um(to) - height_um(from));
+                    let _ = writeln!(text, "{line},{},{},{},{},{slope}", from[0], from[1], to[0], to[1]);
+                }
+            }
+        }
         // Two hours of an exponential rise of each axis.
         "drift" => {
             text.push_str("time_s,x_um,y_um,z_um\n");

@@ -13,7 +13,7 @@ use crate::{
     campaign::{self, Campaign, Named, Ran},
     changed::{Change, Damage},
     harmonics::harmonics,
-    table::{Check, Found, Kind, on_two_threads},
+    table::{Check, Kind, TestOutcome, on_two_threads},
 };
 
 /// Factor of the scaled data.
@@ -61,20 +61,20 @@ pub(crate) fn test(registry: &Arc<runout_core::pipeline::Registry>) -> Kind {
     }
 }
 
-fn all(campaigns: &Table, plugin: &str, registry: &Arc<runout_core::pipeline::Registry>) -> Vec<Found> {
+fn all(campaigns: &Table, plugin: &str, registry: &Arc<runout_core::pipeline::Registry>) -> Vec<TestOutcome> {
     let campaign = campaign::campaign_of(campaigns, "separate", plugin);
     if let Some(why) = campaign.as_ref().ok().and_then(|table| table.get("elsewhere")).and_then(toml::Value::as_str) {
-        return CHECKS.iter().map(|_| Found::Exempt(why.to_owned())).collect();
+        return CHECKS.iter().map(|_| TestOutcome::Exempt(why.to_owned())).collect();
     }
     let campaign = campaign.and_then(|table| Campaign::new(table, plugin, Arc::clone(registry)));
     let campaign = match campaign {
         Ok(campaign) => campaign,
-        Err(why) => return CHECKS.iter().map(|_| Found::Fails(why.clone())).collect(),
+        Err(why) => return CHECKS.iter().map(|_| TestOutcome::Fails(why.clone())).collect(),
     };
     let usual = campaign.run(&Change::default());
     let usual = match usual {
         Ok(usual) => usual,
-        Err(why) => return CHECKS.iter().map(|_| Found::Fails(why.clone())).collect(),
+        Err(why) => return CHECKS.iter().map(|_| TestOutcome::Fails(why.clone())).collect(),
     };
     let unknown = campaign.exempt_checks().find(|name| CHECKS.iter().all(|check| check.0 != name.as_str()));
     assert_eq!(unknown, None, "{plugin} is exempt from a check that there is not");
@@ -82,14 +82,14 @@ fn all(campaigns: &Table, plugin: &str, registry: &Arc<runout_core::pipeline::Re
         let found = one(check.0, &campaign, &usual);
         match (campaign.exempt(check.0), found) {
             (None, found) => found,
-            (Some(_), Found::Holds) => Found::Fails("it holds: take away the exemption".into()),
-            (Some(reason), _) => Found::Exempt(reason.clone()),
+            (Some(_), TestOutcome::Holds) => TestOutcome::Fails("it holds: take away the exemption".into()),
+            (Some(reason), _) => TestOutcome::Exempt(reason.clone()),
         }
     });
     found.collect()
 }
 
-fn one(check: &str, campaign: &Campaign, usual: &Ran) -> Found {
+fn one(check: &str, campaign: &Campaign, usual: &Ran) -> TestOutcome {
     let changed = |change: Change| campaign.run(&change);
     let usual_change = Change::default();
     match check {
@@ -100,18 +100,18 @@ fn one(check: &str, campaign: &Campaign, usual: &Ran) -> Found {
             .and_then(|reversed| same(&usual.values(), &reversed.values(), ROUNDING))
             .into(),
         "lost" => lost(campaign, usual),
-        "scale" if !campaign.has_readings() => Found::Exempt("its data are a model, not readings".into()),
+        "scale" if !campaign.has_readings() => TestOutcome::Exempt("its data are a model, not readings".into()),
         "scale" => changed(Change { scale: SCALE, ..usual_change })
             .and_then(|scaled| scales(&usual.values(), &scaled.values()))
             .into(),
-        "noise" | "truth" if !campaign.has_noise() => Found::Exempt("its campaign has no noise".into()),
+        "noise" | "truth" if !campaign.has_noise() => TestOutcome::Exempt("its campaign has no noise".into()),
         "noise" => match changed(Change { noise: 2.0, ..usual_change }) {
             Ok(noisy) => noise_doubles(usual, &noisy),
-            Err(why) => Found::Fails(why),
+            Err(why) => TestOutcome::Fails(why),
         },
         "truth" if campaign.is_of_turns() => truth_of_turns(campaign, usual).into(),
         "truth" => truth_of_points(campaign),
-        "blocks" if !campaign.is_of_turns() => Found::Exempt("points come as a whole".into()),
+        "blocks" if !campaign.is_of_turns() => TestOutcome::Exempt("points come as a whole".into()),
         "blocks" => [1, 7, 100_000]
             .into_iter()
             .try_for_each(|block| {
@@ -120,7 +120,7 @@ fn one(check: &str, campaign: &Campaign, usual: &Ran) -> Found {
             })
             .into(),
         "bad" => bad(campaign).into(),
-        _ => Found::Fails("there is no such check".into()),
+        _ => TestOutcome::Fails("there is no such check".into()),
     }
 }
 
@@ -187,7 +187,7 @@ fn scales(one: &[Named], scaled: &[Named]) -> Result<(), String> {
 
 /// ± of coefficients of turns, each by itself; of values of points in their median, as that of a peak to valley is not proportional to
 /// noise.
-fn noise_doubles(usual: &Ran, noisy: &Ran) -> Found {
+fn noise_doubles(usual: &Ran, noisy: &Ran) -> TestOutcome {
     let coefficients = |ran: &Ran| {
         harmonics(ran).iter().filter(|row| row.observable && row.order >= 2).map(|row| row.std).collect::<Vec<_>>()
     };
@@ -196,7 +196,7 @@ fn noise_doubles(usual: &Ran, noisy: &Ran) -> Found {
         let (one, other) = (usual.values(), noisy.values());
         let pairs = match pairs(&one, &other) {
             Ok(pairs) => pairs,
-            Err(why) => return Found::Fails(why),
+            Err(why) => return TestOutcome::Fails(why),
         };
         let ratios: Vec<f64> = pairs.filter_map(|(a, b)| Some(b.std? / a.std?)).collect();
         let mut sorted = ratios;
@@ -206,18 +206,18 @@ fn noise_doubles(usual: &Ran, noisy: &Ran) -> Found {
         one.iter().zip(&other).map(|(one, other)| other / one).collect()
     };
     if ratios.is_empty() {
-        return Found::Exempt("no value has a ±".into());
+        return TestOutcome::Exempt("no value has a ±".into());
     }
     ratios.retain(|ratio| (ratio / 2.0 - 1.0).abs() > NOT_LINEAR || ratio.is_nan());
-    ratios.first().map_or(Found::Holds, |ratio| Found::Fails(format!("a ± is {ratio:.3} times as large")))
+    ratios.first().map_or(TestOutcome::Holds, |ratio| TestOutcome::Fails(format!("a ± is {ratio:.3} times as large")))
 }
 
 /// Lost orders: those that are known before the run are null in it, and at every station, whatever the data.
-fn lost(campaign: &Campaign, usual: &Ran) -> Found {
+fn lost(campaign: &Campaign, usual: &Ran) -> TestOutcome {
     if !campaign.is_of_turns() {
         let none = usual.summary.lost_orders.form.is_empty() && usual.summary.lost_orders.others.is_empty();
         if none {
-            return Found::Exempt("no order is lost".into());
+            return TestOutcome::Exempt("no order is lost".into());
         }
         let scaled = campaign.run(&Change { noise: 2.0, seed: 7, ..Change::default() });
         return scaled
@@ -228,10 +228,10 @@ fn lost(campaign: &Campaign, usual: &Ran) -> Found {
             })
             .into();
     }
-    lost_of_turns(campaign, usual).unwrap_or_else(Found::Fails)
+    lost_of_turns(campaign, usual).unwrap_or_else(TestOutcome::Fails)
 }
 
-fn lost_of_turns(campaign: &Campaign, usual: &Ran) -> Result<Found, String> {
+fn lost_of_turns(campaign: &Campaign, usual: &Ran) -> Result<TestOutcome, String> {
     let pipeline = campaign.pipeline(&Change::default(), "")?;
     let (Some(assessment), Some(rig)) = (&pipeline.assessment, &pipeline.rig) else {
         return Err("nothing is said of it before a run".into());
@@ -258,7 +258,7 @@ fn lost_of_turns(campaign: &Campaign, usual: &Ran) -> Result<Found, String> {
             }
         }
     }
-    if count == 0 { Ok(Found::Exempt("no order is lost".into())) } else { Ok(Found::Holds) }
+    if count == 0 { Ok(TestOutcome::Exempt("no order is lost".into())) } else { Ok(TestOutcome::Holds) }
 }
 
 /// Coefficients of form and motion against those of the simulated truth.
@@ -324,16 +324,16 @@ fn coefficient(curve: &[f64], order: usize, is_form: bool) -> [f64; 2] {
 }
 
 /// Values of campaigns with other noise against the truth, or the values of the same points without noise.
-fn truth_of_points(campaign: &Campaign) -> Found {
+fn truth_of_points(campaign: &Campaign) -> TestOutcome {
     let quiet = match campaign.run(&Change { noise: 0.0, ..Change::default() }) {
         Ok(quiet) => quiet.values(),
-        Err(why) => return Found::Fails(format!("without noise: {why}")),
+        Err(why) => return TestOutcome::Fails(format!("without noise: {why}")),
     };
     let mut hits: BTreeMap<String, [usize; 2]> = BTreeMap::new();
     for seed in 1..=campaign.draws() {
         let found = match campaign.run(&Change { seed, ..Change::default() }) {
             Ok(found) => found.values(),
-            Err(why) => return Found::Fails(why),
+            Err(why) => return TestOutcome::Fails(why),
         };
         for value in &found {
             let truth = campaign.truth().get(&value.name).copied();
@@ -348,7 +348,7 @@ fn truth_of_points(campaign: &Campaign) -> Found {
     hits.retain(|name, _| !campaign.is_of_scatter(name));
     let [inside, count] = hits.values().fold([0, 0], |sum, one| [0, 1].map(|at| sum[at] + one[at]));
     if count == 0 {
-        return Found::Exempt("no value has a ±".into());
+        return TestOutcome::Exempt("no value has a ±".into());
     }
     let worst = || {
         hits.iter()

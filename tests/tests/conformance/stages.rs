@@ -18,7 +18,7 @@ use toml::{Spanned, Table, de::DeTable};
 use crate::{
     campaign,
     changed::{Change, Damage, changed_stream},
-    table::{Check, Found, Kind, on_two_threads},
+    table::{Check, Kind, TestOutcome, on_two_threads},
 };
 
 const PREPROCESSORS: [Check; 4] = [
@@ -40,7 +40,7 @@ fn here() -> Context<'static> {
     Context { folder: Path::new("."), rig: None }
 }
 
-fn all(checks: &[Check], one: impl Fn(&str) -> Result<(), String>) -> Vec<Found> {
+fn all(checks: &[Check], one: impl Fn(&str) -> Result<(), String>) -> Vec<TestOutcome> {
     checks.iter().map(|check| one(check.0).into()).collect()
 }
 

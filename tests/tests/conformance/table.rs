@@ -11,7 +11,7 @@ use std::{
 
 /// What a check says of a plugin.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) enum Found {
+pub(crate) enum TestOutcome {
     Holds,
     /// Why it does not apply.
     Exempt(String),
@@ -19,7 +19,7 @@ pub(crate) enum Found {
     Fails(String),
 }
 
-impl From<Result<(), String>> for Found {
+impl From<Result<(), String>> for TestOutcome {
     fn from(result: Result<(), String>) -> Self {
         result.map_or_else(Self::Fails, |()| Self::Holds)
     }
@@ -35,15 +35,15 @@ pub(crate) struct Kind {
     pub(crate) about: &'static str,
     pub(crate) checks: &'static [Check],
     /// Each plugin, and what each check found.
-    pub(crate) plugins: Vec<(String, Vec<Found>)>,
+    pub(crate) plugins: Vec<(String, Vec<TestOutcome>)>,
 }
 
 impl Kind {
     /// Every check that fails, as a line.
     pub(crate) fn failures(&self) -> impl Iterator<Item = String> {
         self.plugins.iter().flat_map(move |(plugin, found)| {
-            let failed = move |(check, found): (&Check, &Found)| match found {
-                Found::Fails(why) => Some(format!("{} {plugin}, {}: {why}", self.heading, check.0)),
+            let failed = move |(check, found): (&Check, &TestOutcome)| match found {
+                TestOutcome::Fails(why) => Some(format!("{} {plugin}, {}: {why}", self.heading, check.0)),
                 _ => None,
             };
             self.checks.iter().zip(found).filter_map(failed)
@@ -61,9 +61,9 @@ impl Kind {
         let _ = writeln!(page, "| --- |{}", " --- |".repeat(self.checks.len()));
         for (plugin, found) in &self.plugins {
             let cells = found.iter().map(|found| match found {
-                Found::Holds => "yes".to_owned(),
-                Found::Fails(_) => "no".to_owned(),
-                Found::Exempt(why) => {
+                TestOutcome::Holds => "yes".to_owned(),
+                TestOutcome::Fails(_) => "no".to_owned(),
+                TestOutcome::Exempt(why) => {
                     let known = reasons.iter().position(|reason| reason == why).unwrap_or_else(|| {
                         reasons.push(why);
                         reasons.len() - 1
@@ -106,8 +106,8 @@ pub(crate) fn page(kinds: &[Kind]) -> String {
 /// What `test` finds of each plugin, in their order.
 pub(crate) fn on_two_threads<'a>(
     names: impl Iterator<Item = &'a str>,
-    test: impl Fn(&str) -> Vec<Found> + Sync,
-) -> Vec<(String, Vec<Found>)> {
+    test: impl Fn(&str) -> Vec<TestOutcome> + Sync,
+) -> Vec<(String, Vec<TestOutcome>)> {
     let names: Vec<&str> = names.collect();
     let (next, found) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
     let work = || {

@@ -7,7 +7,7 @@ use std::{
 
 use super::{Data, HeldOut, Observations, subtract};
 use crate::{
-    Bias, Effect, Fit, Outcome, Remainder, Setting,
+    Bias, Effect, Fit, LookedAt, Remainder, Setting,
     diagnosis::Unexplained,
     evidence::{Group, far_worse},
 };
@@ -222,7 +222,7 @@ impl Fit for LinearFit {
         biases.collect()
     }
 
-    fn values(&self) -> Vec<Outcome> {
+    fn values(&self) -> Vec<LookedAt> {
         let std = self.data.observations.std;
         let level = self.remainder.chi2_per_dof();
         let noise = std.map_or(level, |std| std * std * level.max(1.0));
@@ -230,14 +230,14 @@ impl Fit for LinearFit {
         let left = level * std.map_or(1.0, |std| std * std);
         let factors = &self.judgement().factors;
         let declared = self.data.declared.iter().zip(&self.coefficients).zip(unit_variance.iter().zip(&self.doubt));
-        let declared = declared.zip(factors).map(|(((declared, number), (variance, doubt)), factor)| Outcome {
+        let declared = declared.zip(factors).map(|(((declared, number), (variance, doubt)), factor)| LookedAt {
             value: declared.name.clone(),
             section: None,
             number: *number,
             std: (noise.max(factor * factor * left) * variance + doubt).sqrt(),
             unit: declared.unit.clone(),
         });
-        let unseen = self.data.unseen.iter().map(|unseen| Outcome {
+        let unseen = self.data.unseen.iter().map(|unseen| LookedAt {
             value: format!("rms of {}, never fitted", unseen.name),
             section: None,
             number: self.held_out_rms_of(unseen),

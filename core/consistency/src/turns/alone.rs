@@ -2,7 +2,7 @@
 
 use runout_numerics::Complex64;
 
-use super::{Course, TurnTable, mean, spectrum::Spectrum};
+use super::{TurnCourse, TurnTable, mean, spectrum::Spectrum};
 use crate::check::{Check, FINDING, Test};
 
 /// Times the largest other window from which on a slow course is a finding, with [`MANY`] windows or more.
@@ -16,7 +16,7 @@ const BESIDE: usize = 2;
 const ENDS: usize = 8;
 
 /// Looks at every order that no change of the whole explains.
-pub(super) fn look(table: &TurnTable, spectrum: &Spectrum, course: &mut Course) {
+pub(super) fn look(table: &TurnTable, spectrum: &Spectrum, course: &mut TurnCourse) {
     let (ratios, limit) = ratios(spectrum);
     let explained = !course.orders.is_empty() || course.phase_std_rad > 0.0 || course.size_std > 0.0;
     let most = ratios.iter().copied().enumerate().max_by(|a, b| a.1.total_cmp(&b.1));

@@ -3,7 +3,7 @@
 use runout_numerics::statistics::{f_tail, student_95};
 
 use super::{
-    Course, ORDERS, PhaseCourse, TurnTable,
+    ORDERS, PhaseCourse, TurnCourse, TurnTable,
     parts::{ALIKE_STEPS, LOOKS, Parts, Shared, over_turns},
     start,
 };
@@ -21,7 +21,7 @@ const ROUNDS: usize = 6;
 const PHASE: &str = "phase of all orders";
 
 /// Looks at phase and size.
-pub(super) fn look(table: &TurnTable, course: &mut Course) {
+pub(super) fn look(table: &TurnTable, course: &mut TurnCourse) {
     let [phase, size] = Parts::of(table).map(|parts| parts.and_then(|parts| parts.shared(table.rows())));
     if let Some(size) = size {
         let check = Check::new(Test::Turns, "size of all orders", size.t, &[], (LOOKS * size.p).min(1.0));
@@ -38,7 +38,7 @@ pub(super) fn look(table: &TurnTable, course: &mut Course) {
 }
 
 /// Takes the phase that the linear fit, the products of turns or order 1 alone begin with, and that leaves nothing of its shape.
-fn look_at_phase(table: &TurnTable, linear: Option<Shared>, course: &mut Course) {
+fn look_at_phase(table: &TurnTable, linear: Option<Shared>, course: &mut TurnCourse) {
     let (rows, together) = (table.rows() as f64, table.together.max(1) as f64);
     let run = |by_row: f64| PhaseCourse { by_rad: by_row / together, std_rad: f64::NAN, step_at: None };
     let step = |by_rad: f64, first: usize| PhaseCourse {

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use runout_numerics::Complex64;
 
-use super::{Course, PhaseCourse, TurnTable, common::turning, mean, spectrum::Spectrum};
+use super::{PhaseCourse, TurnCourse, TurnTable, common::turning, mean, spectrum::Spectrum};
 use crate::check::{Check, FINDING, Test};
 
 /// Coherence of order 1 below which a steady turning is looked for: where it takes away four fifths of what lacks, and where half.
@@ -26,7 +26,7 @@ const AT_ORDERS: usize = 3;
 /// Power of what alternates beside all that is synchronous.
 const SHARE: f64 = 0.01;
 
-pub(super) fn look(table: &TurnTable, spectrum: &Spectrum, course: &mut Course) {
+pub(super) fn look(table: &TurnTable, spectrum: &Spectrum, course: &mut TurnCourse) {
     let found = [several_a_turn(table, spectrum), once_in_several(table), turns_against_the_mark(table)];
     for found in found {
         course.checks.push(found.check);
@@ -41,7 +41,7 @@ pub(super) fn look(table: &TurnTable, spectrum: &Spectrum, course: &mut Course) 
     }
 }
 
-struct Found {
+struct MarkFinding {
     check: Check,
     phase_std_rad: f64,
     phase: Option<PhaseCourse>,
@@ -49,7 +49,7 @@ struct Found {
     is_open: bool,
 }
 
-impl Found {
+impl MarkFinding {
     fn new(of: &str, statistic: f64, words: Option<String>) -> Self {
         let p = if words.is_some() { 0.1 * FINDING } else { 1.0 };
         let is_open = words.is_some();
@@ -66,7 +66,7 @@ impl Found {
 }
 
 /// Order 1 falls apart over the turns, and a steady turning puts it together.
-fn turns_against_the_mark(table: &TurnTable) -> Found {
+fn turns_against_the_mark(table: &TurnTable) -> MarkFinding {
     let rows = table.rows();
     let lag: Complex64 = (0..table.channels)
         .flat_map(|channel| table.series(1, channel).skip(1).zip(table.series(1, channel)))
@@ -99,7 +99,7 @@ fn turns_against_the_mark(table: &TurnTable) -> Found {
     let is_turning = is_turning && !(2..=table.orders).any(|order| 1.0 - steady(table, order) < 0.5 * (1.0 - before));
     let by_turn = by_rad / table.together.max(1) as f64;
     let words = is_turning.then(|| turning(by_turn, "order 1 turns"));
-    let mut found = Found::new("order 1 against the mark", before, words);
+    let mut found = MarkFinding::new("order 1 against the mark", before, words);
     if is_turning {
         found.phase_std_rad = by_rad.abs() * ((rows * rows - 1) as f64 / 12.0).sqrt();
         // How well it is known, all orders show.
@@ -117,7 +117,7 @@ fn steady(table: &TurnTable, order: usize) -> f64 {
 }
 
 /// Orders that are no multiples of 2, or of 3, are empty, and an eccentricity stands at order 2, or 3.
-fn once_in_several(table: &TurnTable) -> Found {
+fn once_in_several(table: &TurnTable) -> MarkFinding {
     let rows = table.rows() as f64;
     let squares: Vec<[f64; 2]> = (1..=table.orders)
         .map(|order| {
@@ -149,11 +149,11 @@ fn once_in_several(table: &TurnTable) -> Found {
         format!("{others} and order {turns} is the largest: the mark comes once in {turns} turns of the part")
     });
     let turns = turns.unwrap_or(1) as f64;
-    Found::new("empty orders", turns, words).of_turns_per_mark(turns)
+    MarkFinding::new("empty orders", turns, words).of_turns_per_mark(turns)
 }
 
 /// Every second turn is another one, at several orders at once.
-fn several_a_turn(table: &TurnTable, spectrum: &Spectrum) -> Found {
+fn several_a_turn(table: &TurnTable, spectrum: &Spectrum) -> MarkFinding {
     let at = |order: usize| -> [f64; 2] {
         let of = |channel: usize| {
             let signed = table.series(order, channel).enumerate();
@@ -169,7 +169,7 @@ fn several_a_turn(table: &TurnTable, spectrum: &Spectrum) -> Found {
         let size = (odd / table.channels as f64).sqrt();
         format!("even and odd turns differ by {:.3} µm: two marks a turn, or motion at half of the speed", 2.0 * size)
     });
-    Found::new("even and odd turns", alternating as f64, words).of_turns_per_mark(0.5)
+    MarkFinding::new("even and odd turns", alternating as f64, words).of_turns_per_mark(0.5)
 }
 
 /// Covariance of single turns, `[channel][channel]`.

@@ -17,6 +17,8 @@ enum Trouble {
     Grows(f64),
     MarkEvery(usize),
     MarksATurn(usize),
+    /// In the middle of one turn, in µm.
+    Knock(f64),
 }
 
 struct Recording {
@@ -90,11 +92,14 @@ impl Recording {
                     *walk += TAU * line.wander * random.normal() / (samples as f64).sqrt();
                 }
                 let mut angle = TAU * time * speed;
-                let (mut fade, mut growth) = (0.0, 1.0);
+                let (mut fade, mut growth, mut knock) = (0.0, 1.0, 0.0);
                 match trouble {
                     Trouble::Step(by) => angle -= if time < 0.31 * self.turns as f64 { 0.0 } else { by },
                     Trouble::Fade(by) => fade = by * (-time * 4.0 / self.turns as f64).exp(),
                     Trouble::Grows(by) => growth += by * time / self.turns as f64,
+                    Trouble::Knock(by) if turn == 17 && time > 17.4 => {
+                        knock = by * (-20.0 * (time - 17.4)).exp() * (40.0 * (time - 17.4)).cos();
+                    }
                     _ => {}
                 }
                 for (channel, values) in values.iter_mut().enumerate() {
@@ -106,7 +111,7 @@ impl Recording {
                         part += cosine * c + sine * s;
                     }
                     let mut value =
-                        growth * part + fade * (3.0 * angle + 0.4).cos() + level[channel] + coloured[channel];
+                        growth * part + fade * (3.0 * angle + 0.4).cos() + level[channel] + coloured[channel] + knock;
                     value += self.creep_um * (1.0 - (-time * 3.0 / self.turns as f64).exp());
                     for (line, walk) in lines.iter().zip(&walk) {
                         let swell = 1.0 + line.swell * (TAU * time / line.over + line.phase).sin();
@@ -181,6 +186,7 @@ fn troubles_are_named() {
         (Trouble::MarkEvery(2), "once in 2 turns", 0.95),
         (Trouble::MarkEvery(3), "once in 3 turns", 0.95),
         (Trouble::MarksATurn(2), "two marks a turn", 0.95),
+        (Trouble::Knock(5.0), "turn 18 by", 0.95),
     ] {
         let found = share(&mut random, 40, trouble, words);
         shares.push((trouble, found));

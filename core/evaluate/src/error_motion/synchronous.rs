@@ -23,7 +23,7 @@ pub(super) struct Measured {
 }
 
 /// A plot as it is seen from a centre.
-pub(super) struct Seen {
+pub(super) struct AboutCentre {
     pub range: Measured,
     pub rms: Measured,
     /// On [`FINER`] times the angles.
@@ -46,7 +46,7 @@ pub(super) struct Named<'a> {
 
 impl Synchronous {
     /// The plot from a centre, with errors of orders from `lowest` on; `None` where the centre is not determined.
-    pub(super) fn seen(&self, centre: Centre, angles: usize, lowest: usize, seed: u64) -> Option<Seen> {
+    pub(super) fn seen(&self, centre: Centre, angles: usize, lowest: usize, seed: u64) -> Option<AboutCentre> {
         let mut points = Points::default();
         // Errors raise crests between the given angles too. Draws on angles that show them tell the error as well as draws on
         // those where the range is sought, from which it differs by little.
@@ -87,7 +87,7 @@ impl Synchronous {
         };
         let range = measured(0, ront_lsci_um(&finely));
         let rms = measured(1, rms_about_mean(&seen));
-        Some(Seen { range, rms, finely })
+        Some(AboutCentre { range, rms, finely })
     }
 
     /// The plot from a centre, on so many equal angles.
@@ -99,7 +99,7 @@ impl Synchronous {
     }
 
     /// Its two values.
-    pub(super) fn values(&self, named: &Named, seen: &Seen) -> [Value; 2] {
+    pub(super) fn values(&self, named: &Named, seen: &AboutCentre) -> [Value; 2] {
         let Named { kind, what, id, described, unit, centre } = *named;
         // The root mean square of what lies within a range of B is B/2 at most.
         let range = (format!("{kind}-{id}"), what.to_owned(), &seen.range, self.bound);

@@ -10,7 +10,7 @@ use super::{polar::seen_from, *};
 use runout_draws::IntervalKind;
 use runout_numerics::Complex64;
 use runout_standards::roundness::ront_lsci_um;
-use runout_turning::{azimuth::Azimuth, profile::TurnCount, separation::Residual, spread::Projection};
+use runout_turning::{azimuth::Azimuth, profile::TurnCount, spread::Projection};
 
 const ANGLES: usize = 720;
 /// A chosen sensitive direction.
@@ -29,14 +29,7 @@ pub(super) fn separation(harmonics: &[(usize, [Complex64; 4])]) -> Separation {
         variance: vec![f64::NAN; estimate.len()],
         observable: vec![true; estimate.len()],
         estimate,
-        motion_covariance: None,
-        form_covariance: None,
-        freedom: 0,
-        equivalents: Vec::new(),
-        form_bound: Vec::new(),
-        motion_z_mm: 0.0,
-        residual: Residual::default(),
-        warnings: Vec::new(),
+        ..Separation::default()
     }
 }
 

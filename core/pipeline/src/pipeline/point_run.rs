@@ -37,6 +37,7 @@ fn declared<'a>(separator: &'a dyn PointSeparator, points: &Points) -> Result<Po
     measured::refuse_impossible(points)?;
     let mut outcome = separator.separate(points)?;
     outcome.checks.extend(measured::checks(points, &separator.columns()));
+    outcome.remarks.extend(measured::units(points, &separator.columns()));
     Ok(PointResult { outcome, remarks: Some(separator), effects: Vec::new(), diagnosis: None })
 }
 

@@ -64,7 +64,7 @@ mod tests {
     use super::*;
     use runout_turning::{
         measurement::StationTruth,
-        separation::{Residual, SectionAt, Separation},
+        separation::{SectionAt, Separation},
     };
 
     /// Sensors in one plane measure the motion there: 2 µm at the reference and 5 µrad 100 mm further are 2.5 µm.
@@ -82,14 +82,8 @@ mod tests {
             estimate,
             variance: vec![0.0; 8],
             observable: vec![true; 8],
-            motion_covariance: None,
-            form_covariance: None,
-            freedom: 0,
-            equivalents: Vec::new(),
-            form_bound: Vec::new(),
             motion_z_mm: 100.0,
-            residual: Residual::default(),
-            warnings: Vec::new(),
+            ..Separation::default()
         };
         let truth = StationTruth { form_um: Vec::new(), z_um: None, motion: Some([2.0, -0.5, 2.0, 5.0].map(cosine)) };
         let result = StationResult {

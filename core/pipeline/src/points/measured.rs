@@ -4,6 +4,7 @@ use std::collections::HashMap;
 
 use runout_consistency::{Check, Test};
 use runout_error::{Error, ErrorKind, Result};
+use runout_numerics::number::significant;
 
 use super::{PointColumn, Points};
 
@@ -19,6 +20,8 @@ const ON_GRID: f64 = 1e-3;
 const MATTERS: f64 = 0.1;
 /// Numbers beyond this are nothing that was measured, in any unit; sums of their squares leave the range of numbers.
 const LARGEST: f64 = 1e100;
+/// Ranges of readings in µm that machines and their parts have: below, numbers are in mm, above, in nm.
+const USUAL_UM: [f64; 2] = [0.01, 2e4];
 /// Fewest rows that show whether a column varies.
 const FEWEST_ROWS: usize = 6;
 
@@ -53,6 +56,22 @@ pub fn checks(points: &Points, columns: &[PointColumn]) -> Vec<Check> {
         .into_iter()
         .chain(unmeasured(&measured))
         .collect()
+}
+
+/// Columns whose numbers look as if they had another unit than their name says.
+#[must_use]
+pub fn units(points: &Points, columns: &[PointColumn]) -> Vec<String> {
+    let doubtful = |column: &PointColumn| {
+        let values = points.column(column.name).ok()?;
+        let (low, high) =
+            values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), one| (low.min(*one), high.max(*one)));
+        let range = high - low;
+        let unit = if range < USUAL_UM[0] { "mm" } else { "nm" };
+        (range > 0.0 && !(USUAL_UM[0]..=USUAL_UM[1]).contains(&range)).then(|| {
+            format!("`{}` ranges over {} µm in all: are its numbers in {unit}?", column.name, significant(range, 2))
+        })
+    };
+    columns.iter().filter(|column| column.measured && column.unit == "um").filter_map(doubtful).collect()
 }
 
 /// Readings that come again digit by digit: their noise is that of the first ones, and no scatter shows it.
@@ -150,6 +169,20 @@ mod tests {
         ];
         let points = Points { columns, ..Points::default() };
         checks(&points, &COLUMNS).into_iter().filter(Check::refutes).map(|check| check.finding).collect()
+    }
+
+    #[test]
+    fn numbers_in_another_unit_are_asked_about() {
+        let columns = [PointColumn::needed("deviation_um", Number, "um", "reading").measured()];
+        let said = |scale: f64| {
+            let values = (0..50).map(|row| scale * reading(row)).collect();
+            let points = Points { columns: vec![Column { name: "deviation_um".into(), values }], ..Points::default() };
+            units(&points, &columns)
+        };
+        // Readings to 0.01: of some µm, in mm, and in nm.
+        assert!(said(1e3).is_empty() && said(1e5).is_empty(), "{:?}", said(1e3));
+        assert!(said(0.5)[0].contains("are its numbers in mm?"), "{:?}", said(0.5));
+        assert!(said(1e7)[0].contains("are its numbers in nm?"), "{:?}", said(1e7));
     }
 
     #[test]

@@ -37,7 +37,7 @@ pub struct SpatialDraws<'a> {
     sums: Vec<f64>,
     lags: usize,
     rows: Planes,
-    lines: Vec<Seen>,
+    lines: Vec<SpectralLine>,
     directions: Directions,
     spectra: Vec<Complex64>,
     strongest: Option<Strongest>,
@@ -45,7 +45,7 @@ pub struct SpatialDraws<'a> {
 }
 
 /// A line of the map's spectrum.
-struct Seen {
+struct SpectralLine {
     across: usize,
     amplitude: f64,
     wavelength_mm: f64,
@@ -154,7 +154,7 @@ impl<'a> SpatialDraws<'a> {
                 return;
             }
             let (fx, fy) = (across as f64 / lengths[0], along as f64 / lengths[1]);
-            lines.push(Seen { across, amplitude, wavelength_mm: fx.hypot(fy).recip() });
+            lines.push(SpectralLine { across, amplitude, wavelength_mm: fx.hypot(fy).recip() });
         });
         let [sal_mm, longest_mm] = Decay::new(&centred, &mut correlation, true, decay).lengths();
         let asked = (0..centred.rows()).rev().find(|lag| correlation.is_known(*lag)).unwrap_or(0);
@@ -250,13 +250,13 @@ impl<'a> SpatialDraws<'a> {
 
 impl Strongest {
     /// Of errors that are alike at all periods along the rows: the mean of |E|² over these is the sum over the rows.
-    fn of(lines: &[Seen], errors: &Planes) -> Self {
+    fn of(lines: &[SpectralLine], errors: &Planes) -> Self {
         let mut squares = vec![0.0; errors.bins];
         for row in 0..errors.count() {
             let [re, im] = errors.row(row);
             squares.iter_mut().zip(re.iter().zip(im)).for_each(|(sum, (re, im))| *sum += re * re + im * im);
         }
-        let std = |line: &Seen| (0.5 * squares[line.across]).sqrt();
+        let std = |line: &SpectralLine| (0.5 * squares[line.across]).sqrt();
         let least = lines.iter().map(|line| line.amplitude - FAR * std(line)).fold(0.0, f64::max);
         let strongest = lines.iter().filter(|line| line.amplitude + FAR * std(line) > least);
         Self(strongest.map(|line| [line.amplitude, std(line), line.wavelength_mm]).collect())

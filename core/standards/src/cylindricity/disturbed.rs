@@ -1,14 +1,14 @@
 //! A wall whose errors are drawn again and again.
 
 use super::{Cylinder, Points, Reference, Section, Values, zone::Zone};
-use crate::near::{Course, Near};
+use crate::near::{DeviationSpread, NearContacts};
 
 /// A wall about one reference cylinder. Only points that may come to touch it are looked at, where that is certain.
 #[derive(Debug, Clone)]
 pub struct Disturbed {
     reference: Reference,
     radius_mm: f64,
-    near: Near,
+    near: NearContacts,
     /// Direction, height, section and place in it of the points near.
     at: Vec<((f64, f64), f64, [usize; 2])>,
     /// The cylinder about the wall itself, and heights between which it is looked at.
@@ -34,8 +34,8 @@ impl Disturbed {
     ) -> Option<Self> {
         let cylinder = points.reference(reference)?;
         let deviations: Vec<f64> = points.deviations_um(&cylinder).collect();
-        let near = Near::new(&deviations, cylinder.deviation_um, usual_um);
-        let about = Course::of(deviations.iter().copied()).into();
+        let near = NearContacts::new(&deviations, cylinder.deviation_um, usual_um);
+        let about = DeviationSpread::of(deviations.iter().copied()).into();
         let whole = deviations.iter().all(|deviation| !deviation.is_nan());
         // Errors of orders from 2 on are at right angles to what moves LSCY, on whole circles.
         let stays = reference == Reference::LeastSquares && centred && whole;
@@ -72,8 +72,8 @@ impl Disturbed {
         match self.reference {
             Reference::LeastSquares if !self.offset_um.is_empty() => {
                 let each = drawn.iter().zip(&self.offset_um);
-                let each = each.map(|(section, offset)| Course::less(section.form_um, offset));
-                each.reduce(Course::and).map(Values::from)
+                let each = each.map(|(section, offset)| DeviationSpread::less(section.form_um, offset));
+                each.reduce(DeviationSpread::and).map(Values::from)
             }
             Reference::LeastSquares => self.of_all(drawn),
             Reference::MinimumZone if self.zone.is_some() => {

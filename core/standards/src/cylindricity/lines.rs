@@ -1,7 +1,7 @@
 //! Lines of a wall: generatrices, taper, and the median line through the sections' centres.
 
 use super::{Cylinder, Points, Section};
-use crate::{near::Course, roundness, straightness::about_lsli_um};
+use crate::{near::DeviationSpread, roundness, straightness::about_lsli_um};
 use runout_numerics::{chebyshev::Chebyshev, cloud::Cloud};
 
 /// Values of the generatrices, in µm: lines along the wall at the sections' common angles, as deviations from LSCY.
@@ -55,7 +55,7 @@ impl Generatrices {
         let parallelism = |(index, (z, d)): (usize, &(Vec<f64>, Vec<f64>))| {
             let rise = if planes > 0 { rises[(index + planes) % count] } else { f64::NAN };
             // Outwards on one side is inwards on the other: parallel lines have opposite slopes.
-            let turned = Course::of(z.iter().zip(d).map(|(z, d)| d + rise / length * z));
+            let turned = DeviationSpread::of(z.iter().zip(d).map(|(z, d)| d + rise / length * z));
             turned.high - turned.low
         };
         let parallelism_um = lines.iter().enumerate().map(parallelism).collect();

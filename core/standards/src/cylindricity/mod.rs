@@ -12,7 +12,7 @@ mod search;
 mod series;
 mod zone;
 
-use super::near::Course;
+use super::near::DeviationSpread;
 pub use super::reference::{Reference, Undetermined};
 pub use disturbed::Disturbed;
 pub use lines::{Generatrices, MedianLine};
@@ -72,8 +72,8 @@ pub struct Values {
     pub points: usize,
 }
 
-impl From<Course> for Values {
-    fn from(course: Course) -> Self {
+impl From<DeviationSpread> for Values {
+    fn from(course: DeviationSpread) -> Self {
         Self {
             cylt_um: course.high - course.low,
             cylp_um: course.high.max(0.0),

@@ -6,7 +6,7 @@ use super::{
     Cylinder, Values,
     columns::{About, Axis, Columns},
 };
-use crate::{near::Course, roundness::Angles};
+use crate::{near::DeviationSpread, roundness::Angles};
 
 /// One circle of a wall.
 #[derive(Debug, Clone, Copy)]
@@ -136,7 +136,7 @@ impl Points {
     /// CYLt, CYLp, CYLv and CYLq about a cylinder; NaN where no point is there.
     #[must_use]
     pub fn values(&self, cylinder: &Cylinder) -> Values {
-        Course::of(self.deviations_um(cylinder)).into()
+        DeviationSpread::of(self.deviations_um(cylinder)).into()
     }
 
     /// What distances from an axis need of it.

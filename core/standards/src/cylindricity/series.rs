@@ -1,7 +1,7 @@
 //! Reference cylinders of a wall whose sections are finite sums of harmonics: contacts between the angles.
 
 use super::{Cylinder, Points, Reference, Section, Undetermined, Values};
-use crate::{extremes::extremes, near::Course};
+use crate::{extremes::extremes, near::DeviationSpread};
 use runout_numerics::{Complex64, interpolation::Curve};
 
 /// Looks at all points before giving up; two or three are usual.
@@ -62,7 +62,7 @@ impl<'a> Series<'a> {
         }
         let deviations_um: Vec<f64> = self.points.deviations_um(&cylinder).collect();
         let (on_angles, between) = deviations_um.split_at(self.count);
-        let mut course = Course::of(on_angles.iter().copied());
+        let mut course = DeviationSpread::of(on_angles.iter().copied());
         for deviation in between {
             (course.low, course.high) = (course.low.min(*deviation), course.high.max(*deviation));
         }
@@ -74,7 +74,7 @@ impl<'a> Series<'a> {
         let Some(axis) = self.points.axis_of(cylinder) else { return false };
         let (frame, before) = (self.points.frame(&axis), self.points.len());
         self.points.held.fill(&frame, &mut self.deviations_um);
-        let Course { low, high, .. } = Course::of(self.deviations_um.iter().copied());
+        let DeviationSpread { low, high, .. } = DeviationSpread::of(self.deviations_um.iter().copied());
         let tolerance = self.points.tolerance();
         let mut first = 0;
         for (section, curve) in self.sections.iter().zip(&self.curves) {

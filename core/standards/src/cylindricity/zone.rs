@@ -1,6 +1,6 @@
 //! The minimum zone of a wall to which errors are added again and again.
 //!
-//! Near the axis of MZCY every deviation is linear in the axis, which errors move by about their own size; errors times
+//! NearContacts the axis of MZCY every deviation is linear in the axis, which errors move by about their own size; errors times
 //! the form, over R, are neglected. The zone with errors is then the solution of one linear problem, sought among the points that are near
 //! the ends about the axis of the last one; a look at all points shows whether others touch.
 

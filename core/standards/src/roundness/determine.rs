@@ -1,7 +1,7 @@
 //! Which reference circle of a profile is found how, and values that are found faster near one that is known.
 
 use super::{Circle, Points, Reference, Undetermined, Values, circumscribed, least_squares, search};
-use crate::near::Course;
+use crate::near::DeviationSpread;
 use runout_numerics::lanes::vectorised;
 
 impl Points {
@@ -65,6 +65,10 @@ impl Points {
             deviation_um: circle.deviation_um,
         };
         let (squares, points) = vectorised(squares);
-        if points == 0 { Course::of([].into_iter()).into() } else { Course { low, high, squares, points }.into() }
+        if points == 0 {
+            DeviationSpread::of([].into_iter()).into()
+        } else {
+            DeviationSpread { low, high, squares, points }.into()
+        }
     }
 }

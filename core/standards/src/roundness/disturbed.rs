@@ -6,9 +6,9 @@ use super::{
     Angles, Circle, Points, Reference, Values,
     crests::{Crests, LIFT, around},
     search,
-    warm::{Found, Warm},
+    warm::{NearbyCircle, Warm},
 };
-use crate::near::{Course, Near};
+use crate::near::{DeviationSpread, NearContacts};
 use runout_draws::DrawnErrors;
 
 /// A profile about one reference circle, with its crests between the angles. Only points that may come to touch it are looked
@@ -21,7 +21,7 @@ pub struct Disturbed<'a> {
     angles: &'a Angles,
     form_um: &'a [f64],
     radius_mm: f64,
-    near: Near,
+    near: NearContacts,
     near_angles: Angles,
     /// Centre of the circle about the profile itself.
     centre_um: [f64; 2],
@@ -90,9 +90,9 @@ impl<'a> CircleSearch<'a> {
             crests.set_all(&raw);
         }
         let deviations = if of_angles && between { &crests.heights } else { &raw };
-        let near = Near::new(deviations, circle.deviation_um, usual_um);
-        let ends = Course::of(deviations.iter().copied());
-        let about = Course { squares: Course::of(raw.iter().copied()).squares, ..ends }.into();
+        let near = NearContacts::new(deviations, circle.deviation_um, usual_um);
+        let ends = DeviationSpread::of(deviations.iter().copied());
+        let about = DeviationSpread { squares: DeviationSpread::of(raw.iter().copied()).squares, ..ends }.into();
         Some(Disturbed {
             reference,
             between,
@@ -145,7 +145,7 @@ impl Disturbed<'_> {
     /// From the contacts of the last draw.
     fn touching(&mut self, largest_um: f64) -> Option<Values> {
         self.crests.set_profile(&self.near_angles, &mut self.points, self.radius_mm);
-        let Found { values, place, ends_um } = self.search.as_mut()?.values(&self.points, self.centre_um)?;
+        let NearbyCircle { values, place, ends_um } = self.search.as_mut()?.values(&self.points, self.centre_um)?;
         let moved = (place[0] - self.centre_um[0]).hypot(place[1] - self.centre_um[1]);
         self.near.suffice(ends_um, moved, largest_um).then_some(values)
     }
@@ -171,8 +171,10 @@ impl Disturbed<'_> {
             let drawn_um = &self.drawn_um;
             let heights = (0..count).map(|point| beside(between, point, count).map(|point| drawn_um[point]));
             self.crests.set(heights, TAU / count as f64);
-            let ends = Course::of(self.crests.heights.iter().copied());
-            return Some(Course { squares: Course::of(self.drawn_um.iter().copied()).squares, ..ends }.into());
+            let ends = DeviationSpread::of(self.crests.heights.iter().copied());
+            return Some(
+                DeviationSpread { squares: DeviationSpread::of(self.drawn_um.iter().copied()).squares, ..ends }.into(),
+            );
         }
         if self.between {
             set_crests(&mut self.points, &mut self.crests, self.angles, &self.drawn_um, self.radius_mm);
@@ -277,8 +279,8 @@ mod tests {
                             let circle = points.reference(reference).unwrap();
                             let deviations: Vec<f64> = points.deviations_um(&circle).collect();
                             crests.set_all(&deviations);
-                            let squares = Course::of(deviations.into_iter()).squares;
-                            Course { squares, ..Course::of(crests.heights.iter().copied()) }.into()
+                            let squares = DeviationSpread::of(deviations.into_iter()).squares;
+                            DeviationSpread { squares, ..DeviationSpread::of(crests.heights.iter().copied()) }.into()
                         } else {
                             set_crests(&mut points, &mut crests, &angles, &drawn, 30.0);
                             points.values(&points.reference(reference).unwrap())

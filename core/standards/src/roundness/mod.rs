@@ -26,7 +26,7 @@ mod search;
 mod series;
 mod warm;
 
-use super::near::Course;
+use super::near::DeviationSpread;
 pub use super::reference::{Reference, Undetermined};
 pub use crests::{Heights, Sum};
 pub use disturbed::{CircleSearch, Disturbed};
@@ -67,8 +67,8 @@ pub struct Values {
     pub points: usize,
 }
 
-impl From<Course> for Values {
-    fn from(course: Course) -> Self {
+impl From<DeviationSpread> for Values {
+    fn from(course: DeviationSpread) -> Self {
         Self {
             ront_um: course.high - course.low,
             ronp_um: course.high.max(0.0),

@@ -5,7 +5,7 @@
 use std::{cell::RefCell, f64::consts::TAU, rc::Rc};
 
 use super::{Circle, Values};
-use crate::near::Course;
+use crate::near::DeviationSpread;
 use runout_numerics::{
     cloud::Cloud,
     lanes::{NullaryFnOnce, vectorised},
@@ -230,7 +230,7 @@ impl Points {
     /// RONt, RONp, RONv and RONq about a circle; NaN where no point is there.
     #[must_use]
     pub fn values(&self, circle: &Circle) -> Values {
-        Course::of(self.deviations_um(circle)).into()
+        DeviationSpread::of(self.deviations_um(circle)).into()
     }
 
     /// |c|²/2R, which all heights over a centre lack to (ρ² − R²)/2R.

@@ -19,14 +19,14 @@ pub(super) enum Warm {
 }
 
 /// What was found near a place.
-pub(super) struct Found {
+pub(super) struct NearbyCircle {
     pub values: Values,
     pub place: [f64; 2],
     /// Lowest and highest deviation from the nominal radius.
     pub ends_um: [f64; 2],
 }
 
-impl Found {
+impl NearbyCircle {
     /// By how much the circle's radius exceeds the nominal one.
     pub(super) fn level_um(&self, reference: Reference) -> f64 {
         let [low, high] = self.ends_um;
@@ -51,7 +51,7 @@ impl Warm {
 
     /// Values about the circle with its centre near a place. Of a zone, the heights' shares are those at the place given, which errs by
     /// deviation²/R times what the place moves. `None` where the search has to begin anew.
-    pub(crate) fn values(&mut self, points: &Points, near: [f64; 2]) -> Option<Found> {
+    pub(crate) fn values(&mut self, points: &Points, near: [f64; 2]) -> Option<NearbyCircle> {
         let reach = points.radius_um + points.span_um;
         let limits = near.map(|near| (near - reach, near + reach));
         let place = match self {
@@ -71,7 +71,7 @@ impl Warm {
             Self::OneSided(false, _) => [ront_um, 0.0],
         };
         let values = Values { ront_um, ronp_um, ronv_um, ronq_um: f64::NAN, points: points.len() };
-        Some(Found { values, place, ends_um: [low, high] })
+        Some(NearbyCircle { values, place, ends_um: [low, high] })
     }
 }
 

@@ -5,7 +5,7 @@ use runout_numerics::{
     statistics::{f_tail, student_95},
 };
 
-use super::{Course, Fitted, Sensor, freedom, shape::Shape};
+use super::{CreepLaw, Fitted, Sensor, freedom, shape::Shape};
 
 /// How levels change with rate and time constant, in each capture.
 pub(super) struct Partials {
@@ -25,9 +25,9 @@ impl Partials {
             captures.iter().map(|capture| Shape::new(fitted.course, &capture.middles).values).collect();
         let mut over_capture = [fitted.course.at(sensor.turns), 0.0];
         let mut by_tau: Vec<Vec<f64>> = by_rate.iter().map(|shape| vec![0.0; shape.len()]).collect();
-        if let Course::Settling(tau) = fitted.course {
+        if let CreepLaw::Settling(tau) = fitted.course {
             let step = 1e-3 * tau;
-            let [above, below] = [tau + step, tau - step].map(Course::Settling);
+            let [above, below] = [tau + step, tau - step].map(CreepLaw::Settling);
             let rate = |capture: usize| {
                 if fitted.rates.len() > 1 { fitted.shared } else { fitted.rates.get(capture).copied().unwrap_or(0.0) }
             };

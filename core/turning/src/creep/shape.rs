@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use runout_numerics::least_squares::dot;
 
-use super::{Course, about_mean};
+use super::{CreepLaw, about_mean};
 
 /// Time constants that are tried, from one turn to this many captures, by equal ratios.
 pub(super) const TRIED: usize = 61;
@@ -23,7 +23,7 @@ pub(super) struct Shape {
 }
 
 impl Shape {
-    pub(super) fn new(course: Course, middles: &[f64]) -> Self {
+    pub(super) fn new(course: CreepLaw, middles: &[f64]) -> Self {
         let values = about_mean(middles.iter().map(|turns| course.at(*turns)).collect());
         Self { square: dot(&values, &values), values }
     }
@@ -46,11 +46,11 @@ impl TriedShapes {
         {
             return Arc::clone(known);
         }
-        let settling = |step: usize| Shape::new(Course::Settling(tau_tried(turns, step)), middles);
+        let settling = |step: usize| Shape::new(CreepLaw::Settling(tau_tried(turns, step)), middles);
         let shapes = Arc::new(Self {
             middles: middles.to_vec(),
             turns,
-            straight: Shape::new(Course::Straight, middles),
+            straight: Shape::new(CreepLaw::Straight, middles),
             settling: (0..TRIED).map(settling).collect(),
         });
         known.push(Arc::clone(&shapes));

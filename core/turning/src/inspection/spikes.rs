@@ -47,18 +47,18 @@ pub(super) struct Extents {
 struct Extent {
     samples: u64,
     /// Highest reading, and highest of the negated readings.
-    far: [(f64, Near); 2],
+    far: [(f64, SamplePlace); 2],
 }
 
 /// A sample, to within so many others.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Near {
+struct SamplePlace {
     sample: u64,
     within: u64,
 }
 
 impl Extent {
-    const NONE: Self = Self { samples: 0, far: [(f64::NEG_INFINITY, Near { sample: 0, within: 0 }); 2] };
+    const NONE: Self = Self { samples: 0, far: [(f64::NEG_INFINITY, SamplePlace { sample: 0, within: 0 }); 2] };
 
     fn join(&mut self, other: &Self) {
         self.samples += other.samples;
@@ -89,13 +89,13 @@ impl Extents {
             return;
         }
         let mut place = |side: usize, far: f64, reading: f64| {
-            let middle = Near { sample: start + samples / 2, within: samples.div_ceil(2) };
+            let middle = SamplePlace { sample: start + samples / 2, within: samples.div_ceil(2) };
             if far <= self.records[side] {
                 return (far, middle);
             }
             self.records[side] = far;
             let found = readings().position(|other| other.total_cmp(&reading).is_eq());
-            (far, found.map_or(middle, |sample| Near { sample: start + sample as u64, within: 0 }))
+            (far, found.map_or(middle, |sample| SamplePlace { sample: start + sample as u64, within: 0 }))
         };
         let far = [place(0, highest, highest), place(1, -lowest, lowest)];
         self.under_way.join(&Extent { samples, far });
@@ -136,7 +136,7 @@ impl Extents {
             let limit = upper + (FAR * (upper - lower)).max(MATTERS * swing);
             let sign = if side == 0 { 1.0 } else { -1.0 };
             let value = |extent: &Extent| extent.far[side].0;
-            let mut far: Vec<(f64, Near)> = Vec::new();
+            let mut far: Vec<(f64, SamplePlace)> = Vec::new();
             let (mut before, mut rest) = (None, &stretches[..]);
             for run in stretches.chunk_by(|a, b| (value(a) > limit) == (value(b) > limit)) {
                 rest = &rest[run.len()..];

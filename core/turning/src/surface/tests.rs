@@ -6,7 +6,7 @@ use proptest::prelude::*;
 
 use super::{Surface, SurfaceBuilder, SurfaceConfig};
 use crate::{
-    separation::{Quantity, Residual, SectionAt, Separation},
+    separation::{Quantity, SectionAt, Separation},
     station::StationResult,
 };
 use runout_numerics::Complex64;
@@ -26,14 +26,7 @@ fn station(name: &str, sections: &[(&str, f64, &[Complex64])], variance: f64) ->
             estimate: entries().collect(),
             variance: vec![variance; width * orders],
             observable: entries().map(|value| !value.re.is_nan()).collect(),
-            motion_covariance: None,
-            form_covariance: None,
-            freedom: 0,
-            equivalents: Vec::new(),
-            form_bound: Vec::new(),
-            motion_z_mm: 0.0,
-            residual: Residual::default(),
-            warnings: Vec::new(),
+            ..Separation::default()
         },
         profiles: Vec::new(),
         truth: None,

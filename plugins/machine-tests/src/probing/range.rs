@@ -1,8 +1,6 @@
 //! The range of a few normal numbers: its mean, and what a range found says of it.
 
-use runout_core::draws::Uncertainty;
-
-use crate::draws::Draw;
+use runout_core::draws::{Draw, Uncertainty};
 
 /// Draws of a range.
 const DRAWS: usize = 4000;
@@ -33,21 +31,4 @@ pub(super) fn of_range(range: f64, count: usize, seed: u64) -> Option<Uncertaint
     let at = |share: f64| mean * range / all[(share * (DRAWS - 1) as f64).round() as usize];
     let squares = all.iter().map(|one| (one - mean).powi(2)).sum::<f64>() / (DRAWS - 1) as f64;
     Some(Uncertainty::new(range * squares.sqrt() / mean, [at(0.975), at(0.025)], DRAWS))
-}
-
-/// Correlation of numbers with their order, and that of neighbours; of five numbers or more.
-pub(crate) fn course(numbers: &[f64]) -> Option<[f64; 2]> {
-    let count = numbers.len();
-    if count < 5 {
-        return None;
-    }
-    let (middle, mean) = (0.5 * (count as f64 - 1.0), crate::runs::mean(numbers));
-    let squares: f64 = numbers.iter().map(|number| (number - mean).powi(2)).sum();
-    let places: f64 = (0..count).map(|place| (place as f64 - middle).powi(2)).sum();
-    if squares <= 0.0 {
-        return None;
-    }
-    let along: f64 = numbers.iter().enumerate().map(|(place, number)| (place as f64 - middle) * (number - mean)).sum();
-    let neighbours: f64 = numbers.windows(2).map(|pair| (pair[0] - mean) * (pair[1] - mean)).sum();
-    Some([along / (squares * places).sqrt(), neighbours / squares])
 }

@@ -4,7 +4,7 @@ use std::{collections::VecDeque, f64::consts::TAU};
 
 use runout_core::{
     Complex64,
-    consistency::turns::Course,
+    consistency::turns::TurnCourse,
     measurement::{Block, Capture, Defect},
     near_tone::{NearTone, near_tones},
     numerics::{fourier::max_order, lanes::fused},
@@ -31,7 +31,7 @@ use super::{
 use crate::interruptions::GUARD;
 
 /// What the samples of a capture gave.
-pub(super) struct Outcome {
+pub(super) struct CaptureAverage {
     /// Equal angles on which the turns were taken apart.
     pub turn_angles: usize,
     pub mean: Vec<Complex64>,
@@ -40,7 +40,7 @@ pub(super) struct Outcome {
     pub scatter_beside: Option<Vec<Complex64>>,
     pub near_tones: Vec<NearTone>,
     pub levels: TurnLevels,
-    pub course: Course,
+    pub course: TurnCourse,
     pub split: Option<Split>,
     pub spread: Option<Spread>,
     pub used: usize,
@@ -150,7 +150,7 @@ impl<'a> Resampling<'a> {
     }
 
     /// Works on what only the end of the capture completes.
-    pub(super) fn finish(mut self) -> Outcome {
+    pub(super) fn finish(mut self) -> CaptureAverage {
         let recorded = self.window.end() as f64 - CONTINUED as f64;
         self.window.continue_behind();
         let (covered, cut): (Vec<Turn>, Vec<Turn>) =
@@ -167,7 +167,7 @@ impl<'a> Resampling<'a> {
         }
         self.means.sum_up();
         let neighbours = self.means.whole.neighbours();
-        Outcome {
+        CaptureAverage {
             turn_angles: self.angles,
             mean: self.means.whole.mean(),
             covariance: self.means.whole.covariance(neighbours.as_ref()),
@@ -316,7 +316,7 @@ fn is_smooth(mut number: usize) -> bool {
 }
 
 /// Gives an average, and everything about it order by order, what did not pass.
-pub(super) fn undo(outcome: &mut Outcome, passed: &[Complex64], channels: usize) {
+pub(super) fn undo(outcome: &mut CaptureAverage, passed: &[Complex64], channels: usize) {
     passed::harmonics(&mut outcome.mean, passed, channels);
     for matrices in [&mut outcome.covariance, &mut outcome.scatter, &mut outcome.scatter_beside].into_iter().flatten() {
         passed::squares(matrices, passed, channels);

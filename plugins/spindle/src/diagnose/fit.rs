@@ -7,7 +7,7 @@ use std::sync::Arc;
 use runout_core::{
     Complex64, Error, ErrorKind, Result,
     closed_loop::{
-        Bias, Fit, OpenWithinBound, Outcome, Remainder, Setting,
+        Bias, Fit, LookedAt, OpenWithinBound, Remainder, Setting,
         diagnosis::Unexplained,
         evidence::{Group, far_worse},
     },
@@ -285,7 +285,7 @@ impl Fit for SpindleFit {
     }
 
     /// None: values of form and motion are those that a run computes from [`separations`](Self::separations).
-    fn values(&self) -> Vec<Outcome> {
+    fn values(&self) -> Vec<LookedAt> {
         Vec::new()
     }
 

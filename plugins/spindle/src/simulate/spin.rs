@@ -16,7 +16,7 @@ use super::{
 
 /// How a capture runs, before chance has its say.
 #[derive(Debug, Clone)]
-pub(super) struct Course {
+pub(super) struct SpinCourse {
     samples_per_rev: f64,
     margin: f64,
     /// Turns between the first mark and the last.
@@ -40,7 +40,7 @@ pub(super) struct Ripple {
 /// The angle over time in one capture.
 #[derive(Debug, Clone)]
 pub(super) struct Spin {
-    course: Course,
+    course: SpinCourse,
 }
 
 /// Turns that a capture may have: positions stay far below 2^53 samples.
@@ -50,7 +50,7 @@ const HAIR: f64 = 1e-9;
 /// Terms of the wandering speed: 1 to this many periods in a capture.
 const WOBBLES: usize = 6;
 
-impl Course {
+impl SpinCourse {
     pub(crate) fn new(config: &RecordingConfig) -> Result<Self, Fault> {
         let within = |key: &str, value: usize, first: usize| {
             if (first..=MOST).contains(&value) {
@@ -126,7 +126,7 @@ impl Course {
 impl Spin {
     /// Path in samples at nominal speed, at a position in samples.
     fn path(&self, position: f64) -> f64 {
-        let Course { start_up, run_down, .. } = self.course;
+        let SpinCourse { start_up, run_down, .. } = self.course;
         let end = self.course.length() + start_up + run_down;
         if start_up > 0.0 && position < 2.0 * start_up {
             position * position / (4.0 * start_up)
@@ -139,7 +139,7 @@ impl Spin {
     }
 
     fn position(&self, path: f64) -> f64 {
-        let Course { start_up, run_down, .. } = self.course;
+        let SpinCourse { start_up, run_down, .. } = self.course;
         if path < start_up {
             2.0 * (start_up * path).sqrt()
         } else if path > self.course.length() - run_down {
@@ -165,7 +165,7 @@ impl Spin {
     ///
     /// Kept apart, so that the rest does not lose digits to the turns before it.
     pub(crate) fn turns(&self, position: f64) -> (f64, f64) {
-        let Course { samples_per_rev, margin, .. } = self.course;
+        let SpinCourse { samples_per_rev, margin, .. } = self.course;
         let path = self.path(position) - margin;
         let whole = (path / samples_per_rev).floor();
         let rest = (path - whole * samples_per_rev) / samples_per_rev;
@@ -215,7 +215,7 @@ impl Marks {
 mod tests {
     use super::*;
 
-    fn course(start_up_turns: usize, run_down_turns: usize, speed_wobble_percent: f64) -> Course {
+    fn course(start_up_turns: usize, run_down_turns: usize, speed_wobble_percent: f64) -> SpinCourse {
         let config = RecordingConfig {
             revolutions: 20,
             samples_per_rev: 360,
@@ -224,7 +224,7 @@ mod tests {
             speed_wobble_percent,
             ..RecordingConfig::default()
         };
-        Course::new(&config).unwrap()
+        SpinCourse::new(&config).unwrap()
     }
 
     #[test]

@@ -18,7 +18,7 @@ use super::{
     motion::Motion,
     random::{Place, Purpose, phase, stream},
     series,
-    spin::{Course, Marks},
+    spin::{Marks, SpinCourse},
     strangers::Stranger,
 };
 
@@ -35,7 +35,7 @@ pub(super) struct World {
     pub speed_rpm: f64,
     pub sample_rate_hz: f64,
     pub phase: Phase,
-    pub course: Course,
+    pub course: SpinCourse,
     pub form: Form,
     /// Form that turns with the spindle, in µm, from order 0.
     pub chuck_um: Vec<Complex64>,
@@ -138,7 +138,7 @@ impl World {
         let in_recording = |fault: Fault| fault.under("recording");
         let recording = &config.recording;
         check::positive("speed_rpm", recording.speed_rpm).map_err(in_recording)?;
-        let course = Course::new(recording).map_err(in_recording)?;
+        let course = SpinCourse::new(recording).map_err(in_recording)?;
         let converter = Converter::new(recording).map_err(in_recording)?;
         let stations = stations(&recording.stations).map_err(|fault| in_recording(fault.under("stations")))?;
         let sample_rate_hz = recording.samples_per_rev as f64 * recording.speed_rpm / 60.0;

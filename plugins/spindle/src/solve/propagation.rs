@@ -210,7 +210,7 @@ mod tests {
         *,
     };
     use crate::layout::System;
-    use runout_core::consistency::turns::Course;
+    use runout_core::consistency::turns::TurnCourse;
 
     const SENSORS: usize = 3;
     const SETUPS: usize = 2;
@@ -266,7 +266,7 @@ mod tests {
             turns: vec![10; SETUPS],
             near_tones: vec![Vec::new(); SETUPS],
             angle_std_rad: vec![0.0; SETUPS],
-            courses: vec![Course::default(); SETUPS],
+            courses: vec![TurnCourse::default(); SETUPS],
             places: (0..COUNT).collect(),
         };
         let scatter =

@@ -1,7 +1,7 @@
 //! One station's averaged readings, in the layout's order.
 
 use runout_core::{
-    Complex64, Error, Result, consistency::turns::Course, near_tone::NearTone, profile::Profile, stage::Station,
+    Complex64, Error, Result, consistency::turns::TurnCourse, near_tone::NearTone, profile::Profile, stage::Station,
 };
 
 use crate::{layout::Layout, selection::Selection};
@@ -35,7 +35,7 @@ pub(crate) struct Readings {
     /// Standard uncertainty of the spindle angle in each setup, in rad.
     pub angle_std_rad: Vec<f64>,
     /// How the turns of each setup change, channels in the rig's order.
-    pub courses: Vec<Course>,
+    pub courses: Vec<TurnCourse>,
     /// Place of each reading among the channels of all profiles of the station.
     pub places: Vec<usize>,
 }

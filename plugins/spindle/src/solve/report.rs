@@ -84,11 +84,10 @@ impl Solver<'_> {
             motion_covariance,
             form_covariance,
             freedom: freedom(station, &self.selection.setups),
-            equivalents: Vec::new(),
             form_bound: self.form_bound(operators, &to_reference),
             motion_z_mm: if has_tilt { 0.0 } else { layout.mean_z_mm + station.z_mm },
             residual,
-            warnings: Vec::new(),
+            ..Separation::default()
         }
     }
 

@@ -41,7 +41,7 @@ use crate::{
     summary::Summary,
 };
 use recording::{of_recording, without_recording};
-use report::Found;
+use report::RecordingSummary;
 use runout_error::{Error, ErrorKind, Result};
 use runout_table::{RecordBatch, TableSpec};
 use runout_turning::provenance::{Input, VERSION};
@@ -107,24 +107,24 @@ pub struct Batch<'a> {
 }
 
 /// What became of a recording.
-enum Outcome {
-    Done(Found),
-    Skipped(Found),
+enum RecordingOutcome {
+    Done(RecordingSummary),
+    Skipped(RecordingSummary),
     Failed(Error),
 }
 
 /// A recording whose computation is over.
 enum Computed {
-    UpToDate(Found),
+    UpToDate(RecordingSummary),
     /// Its files wait for their names.
     Files(Box<CompleteFiles>),
 }
 
 impl Computed {
-    fn publish(self, recording: &str) -> Result<Outcome> {
+    fn publish(self, recording: &str) -> Result<RecordingOutcome> {
         match self {
-            Self::UpToDate(found) => Ok(Outcome::Skipped(found)),
-            Self::Files(files) => Ok(Outcome::Done(Found::of(recording, &files.publish()?))),
+            Self::UpToDate(found) => Ok(RecordingOutcome::Skipped(found)),
+            Self::Files(files) => Ok(RecordingOutcome::Done(RecordingSummary::of(recording, &files.publish()?))),
         }
     }
 }
@@ -171,15 +171,15 @@ impl<'a> Batch<'a> {
         for (recording, outcome) in recordings.iter().zip(outcomes) {
             given.insert(recording.name.as_str());
             let found = match outcome {
-                Outcome::Done(found) => {
+                RecordingOutcome::Done(found) => {
                     report.done += 1;
                     found
                 }
-                Outcome::Skipped(found) => {
+                RecordingOutcome::Skipped(found) => {
                     report.skipped += 1;
                     found
                 }
-                Outcome::Failed(error) => {
+                RecordingOutcome::Failed(error) => {
                     report.failed.push(Failed::of(recording, &error));
                     continue;
                 }
@@ -191,7 +191,7 @@ impl<'a> Batch<'a> {
         for name in kept.into_iter().filter(|name| !given.contains(name.as_str())) {
             match self.summary(&name).filter(|summary| self.is_of_configuration(summary)) {
                 Some(summary) => {
-                    let found = Found::of(&name, &summary);
+                    let found = RecordingSummary::of(&name, &summary);
                     speeds.extend(found.speed());
                     report.count(&name, found);
                     report.earlier += 1;
@@ -217,9 +217,9 @@ impl<'a> Batch<'a> {
         kept: &BTreeSet<String>,
         jobs: NonZeroUsize,
         observer: &dyn Observer,
-    ) -> Vec<Outcome> {
+    ) -> Vec<RecordingOutcome> {
         let next = AtomicUsize::new(0);
-        let outcomes: Mutex<Vec<Option<Outcome>>> = Mutex::new(recordings.iter().map(|_| None).collect());
+        let outcomes: Mutex<Vec<Option<RecordingOutcome>>> = Mutex::new(recordings.iter().map(|_| None).collect());
         observer.begin(recordings.len());
         let claimed = || {
             let index = next.fetch_add(1, Ordering::Relaxed);
@@ -227,7 +227,7 @@ impl<'a> Batch<'a> {
         };
         let publish = |(index, computed): (usize, Result<Computed>)| {
             let name = &recordings[index].name;
-            let outcome = computed.and_then(|computed| computed.publish(name)).unwrap_or_else(Outcome::Failed);
+            let outcome = computed.and_then(|computed| computed.publish(name)).unwrap_or_else(RecordingOutcome::Failed);
             outcomes.lock().unwrap_or_else(PoisonError::into_inner)[index] = Some(outcome);
             observer.station(name);
             Ok(())
@@ -250,7 +250,7 @@ impl<'a> Batch<'a> {
         });
         let outcomes = outcomes.into_inner().unwrap_or_else(PoisonError::into_inner);
         let stopped = || Error::new("run", "the recording", "its thread stopped").of(ErrorKind::Interrupted);
-        outcomes.into_iter().map(|outcome| outcome.unwrap_or_else(|| Outcome::Failed(stopped()))).collect()
+        outcomes.into_iter().map(|outcome| outcome.unwrap_or_else(|| RecordingOutcome::Failed(stopped()))).collect()
     }
 
     /// Computes the result of a recording, of which something is kept or nothing.
@@ -269,7 +269,7 @@ impl<'a> Batch<'a> {
             // What cannot be read now is not up to date; the run says why.
             && is_of_inputs(&summary, &pipeline).unwrap_or(false)
         {
-            return Ok(Computed::UpToDate(Found::of(&recording.name, &summary)));
+            return Ok(Computed::UpToDate(RecordingSummary::of(&recording.name, &summary)));
         }
         if is_kept {
             self.store.remove(&recording.name)?;

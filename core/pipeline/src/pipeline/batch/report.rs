@@ -99,7 +99,7 @@ pub struct LimitCount {
 }
 
 /// What a batch keeps of the summary of one recording.
-pub(super) struct Found {
+pub(super) struct RecordingSummary {
     decisions: Vec<Decision>,
     warnings: usize,
     first: Vec<String>,
@@ -107,7 +107,7 @@ pub(super) struct Found {
     at_speed: Option<AtSpeed>,
 }
 
-impl Found {
+impl RecordingSummary {
     /// Its speed, where that is known.
     pub(super) fn speed(&self) -> Option<AtSpeed> {
         self.at_speed.clone()
@@ -158,7 +158,7 @@ impl BatchReport {
     }
 
     /// Counts what was decided of one recording, and keeps what it warns of.
-    pub(super) fn count(&mut self, recording: &str, found: Found) {
+    pub(super) fn count(&mut self, recording: &str, found: RecordingSummary) {
         if found.at_speed.is_none() {
             self.without_speed.push(recording.to_owned());
         }
@@ -166,7 +166,7 @@ impl BatchReport {
             self.warned += 1;
             self.warning_count += found.warnings;
             if self.warnings.len() < MOST_WARNED {
-                let Found { warnings: count, first, .. } = found;
+                let RecordingSummary { warnings: count, first, .. } = found;
                 self.warnings.push(Warned { recording: recording.to_owned(), count, first });
             }
         }

@@ -93,18 +93,18 @@ fn together(by: &[PhaseCourse], next: PhaseCourse) -> Vec<PhaseCourse> {
 }
 
 /// What was recounted: station, place of the profile in it, and how.
-pub(super) struct Found {
+pub(super) struct RecountedProfile {
     station: usize,
     profile: usize,
     recounted: Recounted,
 }
 
 /// Takes what was recounted out of the profiles.
-pub(super) fn take(stations: &mut [Station]) -> Vec<Found> {
+pub(super) fn take(stations: &mut [Station]) -> Vec<RecountedProfile> {
     let mut found = Vec::new();
     for (station, of_station) in stations.iter_mut().enumerate() {
         for (profile, of_setup) in of_station.profiles.iter_mut().enumerate() {
-            found.extend(of_setup.recounted.take().map(|recounted| Found { station, profile, recounted }));
+            found.extend(of_setup.recounted.take().map(|recounted| RecountedProfile { station, profile, recounted }));
         }
     }
     found
@@ -113,7 +113,7 @@ pub(super) fn take(stations: &mut [Station]) -> Vec<Found> {
 /// The stations as they are marked, where that differs.
 pub(super) fn as_marked<'a>(
     stations: &'a [Station],
-    found: &'a [Found],
+    found: &'a [RecountedProfile],
 ) -> impl Iterator<Item = (usize, Station)> + 'a {
     let of_station = |index: usize| found.iter().filter(move |found| found.station == index);
     let differs = move |(index, _): &(usize, &Station)| of_station(*index).next().is_some();
@@ -127,10 +127,11 @@ pub(super) fn as_marked<'a>(
 }
 
 /// Says what was recounted, setup by setup: one run of all its stations once, everything else by itself.
-pub(super) fn say(found: &[Found], stations: &[Station], rig: &Rig, levels: [Left; 2], into: &mut PutRight) {
+pub(super) fn say(found: &[RecountedProfile], stations: &[Station], rig: &Rig, levels: [Left; 2], into: &mut PutRight) {
     let several = stations.len() > 1;
     for (setup, declared) in rig.setups.iter().enumerate() {
-        let of_setup: Vec<&Found> = found.iter().filter(|found| found.recounted.as_marked.setup == setup).collect();
+        let of_setup: Vec<&RecountedProfile> =
+            found.iter().filter(|found| found.recounted.as_marked.setup == setup).collect();
         let runs = of_setup.iter().map(|found| match found.recounted.by[..] {
             [phase] if is_run(&phase) => Some(phase),
             _ => None,
@@ -164,7 +165,7 @@ pub(super) fn say(found: &[Found], stations: &[Station], rig: &Rig, levels: [Lef
 }
 
 /// Chance of what single turns show.
-fn chance(found: &Found) -> f64 {
+fn chance(found: &RecountedProfile) -> f64 {
     let checks = found.recounted.as_marked.course.checks.iter();
     checks.filter(|check| check.refutes()).map(|check| check.p).fold(1.0, f64::min)
 }

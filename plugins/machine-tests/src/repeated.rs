@@ -1,0 +1,157 @@
+//! What readings that were repeated say of themselves: the tests of [`consistency`](runout_core::consistency), which contradict values.
+
+use runout_core::{
+    consistency::{Action, Check, Judgement, Kind, LinearFit, Structure, Test, judge, rows},
+    numerics::least_squares::Basis,
+};
+
+use crate::runs::{Approaches, mean};
+
+/// Series that are looked at: more show no more.
+const MOST_SERIES: usize = 20;
+/// Parts of the travel whose scatter is compared.
+const PARTS: usize = 4;
+
+/// What the user should know, and what readings say of themselves.
+#[derive(Default)]
+pub(crate) struct Said {
+    pub remarks: Vec<String>,
+    pub checks: Vec<Check>,
+}
+
+/// Numbers that were taken one after the other, in series of their own: whether they depend on those beside them, and whether a single one is
+/// unlike the others. A finding contradicts the values.
+pub(crate) fn in_order(what: &str, series: &[(&str, &[f64])], unit: &str) -> Vec<Check> {
+    contradicting(Series::of(&series[..series.len().min(MOST_SERIES)]).judged(what, unit, false).checks)
+}
+
+/// Findings that no wider uncertainty answers: the values are no means.
+fn contradicting(mut checks: Vec<Check>) -> Vec<Check> {
+    checks.iter_mut().filter(|check| !check.finding.is_empty()).for_each(|check| check.did = Action::Verdict);
+    checks
+}
+
+/// The same with the factor on the standard uncertainty of each mean, by which a dependence widens it.
+pub(crate) fn means_in_order(what: &str, series: &[(&str, &[f64])], unit: &str) -> Judgement {
+    Series::of(series).judged(what, unit, true)
+}
+
+/// Numbers beside the mean of their series.
+struct Series<'a> {
+    all: &'a [(&'a str, &'a [f64])],
+    /// Of each number, its series and its place there.
+    place: Vec<(usize, usize)>,
+}
+
+impl<'a> Series<'a> {
+    fn of(all: &'a [(&'a str, &'a [f64])]) -> Self {
+        let place = all.iter().enumerate().flat_map(|(own, (_, of))| (0..of.len()).map(move |at| (own, at)));
+        Self { all, place: place.collect() }
+    }
+
+    /// A column for each series: a function of its length, and 0 elsewhere.
+    fn columns(&self, of: fn(f64) -> f64) -> Vec<Vec<f64>> {
+        let column = |number: usize| {
+            let entry = of(self.all[number].1.len() as f64);
+            self.place.iter().map(|(own, _)| if *own == number { entry } else { 0.0 }).collect()
+        };
+        (0..self.all.len()).map(column).collect()
+    }
+
+    fn judged(&self, what: &str, unit: &str, has_means: bool) -> Judgement {
+        let means: Vec<f64> = self.all.iter().map(|(_, of)| mean(of)).collect();
+        let residual: Vec<f64> = self.place.iter().map(|(own, at)| self.all[*own].1[*at] - means[*own]).collect();
+        let structure = Structure::default()
+            .along(
+                what,
+                self.place.iter().map(|(own, _)| *own).collect(),
+                self.place.iter().map(|(_, at)| *at as f64).collect(),
+            )
+            .naming(self.place.iter().map(|(own, at)| format!("{} {}", self.all[*own].0, at + 1)).collect());
+        let fit = LinearFit {
+            residual: &residual,
+            basis: &self.columns(|count| count.sqrt().recip()),
+            names: &self.all.iter().map(|(name, _)| (*name).to_owned()).collect::<Vec<String>>(),
+            weights: &if has_means { self.columns(f64::recip) } else { Vec::new() },
+            noise: None,
+            unit,
+        };
+        judge(fit, &structure)
+    }
+}
+
+/// Approaches of targets: whether those of a run depend on each other along the travel, whether they scatter alike in all parts of it, and
+/// single ones unlike the others of their target; beside what a whole run is off by, at all targets and along the travel.
+pub(crate) fn approaches(of: &Approaches, along: &[f64], [place, unit]: [&str; 2]) -> Vec<Check> {
+    let (runs, targets, sides) = (of.fewest_runs(), of.targets.len(), of.sides.len());
+    // Orthonormal contrasts of the runs (Helmert): of independent runs they are independent, and have no mean.
+    let contrast = |number: usize, run: usize| {
+        let before = (number + 1) as f64;
+        let size = (before * (before + 1.0)).sqrt();
+        if run <= number {
+            -1.0 / size
+        } else if run == number + 1 {
+            before / size
+        } else {
+            0.0
+        }
+    };
+    let mut readings = Vec::new();
+    for number in 0..runs - 1 {
+        for side in 0..sides {
+            readings.extend((0..targets).map(|target| (number, side, target)));
+        }
+    }
+    let value = |(number, side, target): &(usize, usize, usize)| {
+        let cell = &of.deviations[*target][*side][..runs];
+        cell.iter().enumerate().map(|(run, one)| contrast(*number, run) * one).sum::<f64>()
+    };
+    let column = |number: usize, of: &dyn Fn(usize) -> f64| -> Vec<f64> {
+        readings.iter().map(|(own, _, target)| if *own == number { of(*target) } else { 0.0 }).collect()
+    };
+    let whole = (0..runs - 1).flat_map(|number| [column(number, &|_| 1.0), column(number, &|target| along[target])]);
+    let basis = Basis::of(whole.collect());
+    let mut residual: Vec<f64> = readings.iter().map(value).collect();
+    basis.remove_from(&mut residual);
+    let each = targets.div_ceil(PARTS);
+    let part = |first: usize| {
+        let last = (first + each).min(targets) - 1;
+        format!("the travel from {} to {} {place}", of.targets[first], of.targets[last])
+    };
+    let structure = Structure::default()
+        .along(
+            "the travel",
+            readings.iter().map(|(number, side, _)| number * sides + side).collect(),
+            readings.iter().map(|(.., target)| of.targets[*target]).collect(),
+        )
+        .divided(
+            "parts",
+            Kind::Alike,
+            readings.iter().map(|(.., target)| target / each).collect(),
+            (0..targets).step_by(each).map(part).collect(),
+        );
+    let fit = LinearFit { residual: &residual, basis: basis.columns(), names: &[], weights: &[], noise: None, unit };
+    let mut checks = judge(fit, &structure).checks;
+    // Contrasts have no single approach.
+    checks.retain(|check| check.test != Test::Rows);
+    checks.extend(single(of, runs, unit));
+    contradicting(checks)
+}
+
+/// Single approaches that are not like the others of their target.
+fn single(of: &Approaches, runs: usize, unit: &str) -> Option<Check> {
+    let (mut left, mut names) = (Vec::new(), Vec::new());
+    for (target, of_target) in of.targets.iter().zip(&of.deviations) {
+        for (side, all) in of.sides.iter().zip(of_target) {
+            let middle = mean(all);
+            for (run, one) in all.iter().enumerate() {
+                left.push(one - middle);
+                names.push(format!("approach {} of target {target} in direction {side:+}", run + 1));
+            }
+        }
+    }
+    // A wild one moves the mean that it is measured from.
+    let unit_of_mean = runs as f64 / (runs as f64 - 1.0);
+    let found = rows::unlike(&left, &[])?.scaled(unit_of_mean);
+    Some(found.check(&Structure::default().naming(names), unit))
+}
