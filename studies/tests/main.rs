@@ -10,4 +10,6 @@ mod minimum_zone_cylinder;
 mod rotor;
 mod spatial;
 mod straightness;
+#[path = "../../tests/support/trials.rs"]
+mod trials;
 mod values;

@@ -162,3 +162,6 @@ mod gap_tests;
 mod likely_tests;
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+#[path = "../../../tests/support/trials.rs"]
+mod trials;

@@ -7,3 +7,5 @@ mod measured;
 mod measured_data;
 mod simulated;
 mod simulator;
+#[path = "../../../tests/support/trials.rs"]
+mod trials;

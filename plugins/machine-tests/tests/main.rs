@@ -9,3 +9,5 @@ mod probing;
 mod rotary_path;
 mod structural;
 mod support;
+#[path = "../../../tests/support/trials.rs"]
+mod trials;

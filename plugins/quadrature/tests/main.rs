@@ -5,3 +5,5 @@ mod measured;
 #[path = "../../../tests/support/measured_data.rs"]
 mod measured_data;
 mod simulated;
+#[path = "../../../tests/support/trials.rs"]
+mod trials;
