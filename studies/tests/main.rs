@@ -4,9 +4,12 @@
 mod axial;
 mod blind;
 mod blind_points;
+mod consistency;
 mod coverage;
 mod eccentricity;
 mod minimum_zone_cylinder;
+mod monte_carlo;
+mod results;
 mod rotor;
 mod spatial;
 mod straightness;

@@ -149,3 +149,15 @@ fn angles_that_are_declared_wrongly_are_named() {
         assert!(said.first().is_some_and(|first| first.contains(what)), "{what}: {said:?}");
     }
 }
+
+/// With symmetric seats, the travel repeats after 120°, and is largest and smallest towards a seat and away from it.
+#[test]
+fn three_seats_make_three_lobes() {
+    let mut scenario = scenario(1, &setups(&[(0.0, 0.0)]));
+    (scenario.probe.seats_deg, scenario.probe.preload_at_mm) = ([90.0, 210.0, 330.0], [0.0; 2]);
+    let travel = |degrees: f64| scenario.pretravel_um(degrees.to_radians());
+    for degrees in [0.0, 17.0, 90.0] {
+        assert!((travel(degrees) - travel(degrees + 120.0)).abs() < 1e-6);
+    }
+    assert!((travel(90.0) - travel(150.0)).abs() > 5.0, "{} {}", travel(90.0), travel(150.0));
+}
