@@ -7,6 +7,4 @@ mod real_files;
 mod references;
 mod resampling;
 mod support;
-#[path = "../../../tests/support/trials.rs"]
-mod trials;
 mod turns;
