@@ -88,20 +88,3 @@ pub fn table(campaigns: u64, rows: &[Row]) -> String {
     }
     text
 }
-
-#[cfg(test)]
-mod tests {
-    #![allow(clippy::unwrap_used, reason = "tests")]
-
-    use super::*;
-
-    /// Threads change no campaign.
-    #[test]
-    fn more_threads_find_the_same() {
-        let found = rows(4, &[1, 2]).unwrap();
-        let bits = |row: &Row| row.form_error_um.map(f64::to_bits);
-        assert_eq!(bits(&found[0]), bits(&found[1]));
-        // Three setups of 60 turns: noise of 0.05 µm and asynchronous motion of 0.15 µm leave some nanometres.
-        assert!((5e-4..2e-2).contains(&found[0].form_error_um[1]), "{:?}", found[0]);
-    }
-}

@@ -193,28 +193,3 @@ fn leaves(value: &Value, place: &str, into: &mut BTreeMap<String, Vec<f64>>) {
         Value::Null | Value::Bool(_) | Value::String(_) => {}
     }
 }
-
-#[cfg(test)]
-mod tests {
-    #![allow(clippy::unwrap_used, reason = "tests")]
-
-    use super::*;
-
-    #[test]
-    fn numbers_that_differ_are_named() {
-        let folder = tempfile::tempdir().unwrap();
-        for (side, number) in [("a", "1.0"), ("b", "1.000000001")] {
-            fs::create_dir(folder.path().join(side)).unwrap();
-            let text = format!("{{\"values\": [{number}, 2.0], \"inputs\": [{{\"bytes\": {}}}]}}", number.len());
-            fs::write(folder.path().join(side).join("summary.json"), text).unwrap();
-        }
-        fs::write(folder.path().join("b/new.json"), "{}").unwrap();
-        let sides = ["a", "b"].map(|side| folder.path().join(side));
-        let found = compare(&sides[0], &sides[1], 1e-12).unwrap();
-        assert!(found.differ() && found.compared == 2, "{}", found.report());
-        assert_eq!(found.beyond.len(), 1);
-        assert!(found.beyond[0].0.contains("summary.json: /values/0"), "{}", found.report());
-        assert_eq!(found.missing, ["new.json"]);
-        assert!(!compare(&sides[0], &sides[0], 0.0).unwrap().differ());
-    }
-}

@@ -55,9 +55,16 @@ found.plots = await plots();
 
 // The controls: another panel, a filter, the slider, a ring.
 found.controls = await page.evaluate(async () => {
-  const wait = () => new Promise((done) => setTimeout(done, 300));
+  const wait = (ms) => new Promise((done) => setTimeout(done, ms));
   const of = (plot) => JSON.stringify(plot.data.map((trace) => [trace.x, trace.z, trace.r, trace.y].map((list) => (list ? [...list].slice(0, 3).map((one) => (one?.slice ? one.slice(0, 3) : one)) : null))));
-  const changes = async (plot, act) => { const before = of(plot); act(); await wait(); return of(plot) !== before; };
+  // Until the plot is another one, and what else is drawn with it is drawn; what does not change is waited for.
+  const changes = async (plot, act) => {
+    const before = of(plot);
+    act();
+    for (let waited = 0; waited < 300 && of(plot) === before; waited += 20) await wait(20);
+    await wait(40);
+    return of(plot) !== before;
+  };
   const result = {};
   for (const box of document.querySelectorAll("[data-figure]")) {
     const plot = box.querySelector(".plot[id^=plot-]");
@@ -67,8 +74,7 @@ found.controls = await page.evaluate(async () => {
     if (next) said.panel = await changes(plot, () => next.click());
     const filter = [...box.querySelectorAll("label")].find((label) => label.textContent.startsWith("Filter"))?.querySelector("select");
     if (filter) said.filter = await changes(plot, () => { filter.value = "15"; filter.dispatchEvent(new Event("change")); });
-    if (filter) { filter.value = "0"; filter.dispatchEvent(new Event("change")); }
-    await wait();
+    if (filter) await changes(plot, () => { filter.value = "0"; filter.dispatchEvent(new Event("change")); });
     const choose = async (text, value) => {
       const select = [...box.querySelectorAll("label")].find((label) => label.textContent.startsWith(text))?.querySelector("select");
       if (!select) return undefined;
@@ -84,9 +90,7 @@ found.controls = await page.evaluate(async () => {
   const slider = document.querySelector("#surface input[type=range]");
   if (slider) {
     result.slider = await changes(document.getElementById("solid-surface"), () => { slider.value = 80; slider.dispatchEvent(new Event("input")); });
-    slider.value = 50;
-    slider.dispatchEvent(new Event("input"));
-    await wait();
+    await changes(document.getElementById("solid-surface"), () => { slider.value = 50; slider.dispatchEvent(new Event("input")); });
   }
   return result;
 });
@@ -111,13 +115,14 @@ const client = await page.createCDPSession();
 const { readFileSync } = await import("node:fs");
 const { frameTree } = await client.send("Page.getFrameTree");
 const { executionContextId } = await client.send("Page.createIsolatedWorld", { frameId: frameTree.frame.id, worldName: "audit" });
-const source = `${readFileSync(axe, "utf8")}; axe.run(document, { resultTypes: ["violations"] }).then((result) => JSON.stringify(result.violations.map((one) => ({ id: one.id, impact: one.impact, help: one.help, nodes: one.nodes.slice(0, 3).map((node) => node.html.slice(0, 160)) }))))`;
-// By day, by night and on a phone.
-for (const [scheme, width] of [["light", 1440], ["dark", 1440], ["light", 390]]) {
+const source = (rules) => `${readFileSync(axe, "utf8")}; axe.run(document, { resultTypes: ["violations"], ...${JSON.stringify(rules)} }).then((result) => JSON.stringify(result.violations.map((one) => ({ id: one.id, impact: one.impact, help: one.help, nodes: one.nodes.slice(0, 3).map((node) => node.html.slice(0, 160)) }))))`;
+// By day, by night, which has other colours and nothing else, and on a phone.
+const colours = { runOnly: { type: "rule", values: ["color-contrast", "link-in-text-block"] } };
+for (const [scheme, width, rules] of [["light", 1440, {}], ["dark", 1440, colours], ["light", 390, {}]]) {
   await page.setViewport({ width, height: 900 });
   await page.emulateMediaFeatures([{ name: "prefers-color-scheme", value: scheme }]);
   await new Promise((done) => setTimeout(done, 500));
-  const audited = await client.send("Runtime.evaluate", { expression: source, contextId: executionContextId, awaitPromise: true, returnByValue: true });
+  const audited = await client.send("Runtime.evaluate", { expression: source(rules), contextId: executionContextId, awaitPromise: true, returnByValue: true });
   const of = audited.exceptionDetails ? [{ id: "axe", impact: "serious", help: JSON.stringify(audited.exceptionDetails).slice(0, 400), nodes: [] }] : JSON.parse(audited.result.value);
   found.axe.push(...of.map((one) => ({ ...one, where: `${scheme}, ${width} px` })));
   const overflow = await page.evaluate(() => document.documentElement.scrollWidth - innerWidth);

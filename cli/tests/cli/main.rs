@@ -30,6 +30,8 @@ mod schemas;
 mod speed;
 mod straightness;
 mod text_recording;
+#[path = "../../../tests/support/trials.rs"]
+mod trials;
 mod values;
 mod warnings;
 mod widths;

@@ -5,6 +5,7 @@ use serde_json::{Value, json};
 use crate::{
     diagnosed::{PIPELINE, SCENARIO, document, value},
     folder::Folder,
+    trials::{fewest, is_full},
 };
 
 /// Example 6 with an effect in place of its own, 50 turns.
@@ -23,7 +24,7 @@ fn form_error(diagnosis: &Value) -> f64 {
 }
 
 /// A mark on another shaft, by a thousandth of a degree to a tenth of a turn, and samples that are lost, in one setup or in all: found with their
-/// size, and the form is that of the same campaign without them.
+/// size, and the form is that of the same campaign without them. In a usual run the smallest and the largest of each, in one setup and in all.
 #[test]
 fn marks_that_do_not_count_the_turns_are_put_right() {
     let run = |targets: &str, deg: f64| {
@@ -43,7 +44,10 @@ fn marks_that_do_not_count_the_turns_are_put_right() {
         (6, lost(one, 21.0, 0.3), "lost-samples", "lost", 0.3, 1),
         (7, lost(all, 33.4, 3.0), "lost-samples", "lost", 3.0, 3),
         (8, lost(one, 20.3, 90.0), "lost-samples", "lost", 90.0, 1),
-    ] {
+    ]
+    .into_iter()
+    .filter(|(seed, ..)| is_full() || [1, 5, 7, 8].contains(seed))
+    {
         let folder = campaign(seed, &effect);
         let diagnosis = document(&folder, &["diagnose", "pipeline.toml", "--write", "corrected.toml"]);
         println!("simulated, {effect:?}: {} {}", diagnosis["verdict"], diagnosis["added"]);
@@ -72,7 +76,7 @@ fn marks_that_do_not_count_the_turns_are_put_right() {
     }
     println!("simulated, form error over that without: {errors:.3?}; {held} of {compared} sizes within 2 std");
     assert!(errors.iter().all(|ratio| *ratio < 1.1), "{errors:?}");
-    assert!(held * 100 >= 80 * compared, "{held} of {compared}");
+    assert!(held >= fewest(compared, [12, 14], 0.95), "{held} of {compared}");
 }
 
 /// A list of effects leaves out the mistakes that it does not name, and no mistake is of known size.

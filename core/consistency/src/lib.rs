@@ -41,6 +41,9 @@ pub mod rows;
 pub mod structure;
 #[cfg(test)]
 mod testing;
+#[cfg(test)]
+#[path = "../../../tests/support/trials.rs"]
+mod trials;
 pub mod turns;
 
 pub use check::{Action, Check, Test, findings, refuted_by};

@@ -172,3 +172,6 @@ mod gap_tests;
 mod likely_tests;
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+#[path = "../../../tests/support/trials.rs"]
+mod trials;

@@ -7,4 +7,6 @@ mod real_files;
 mod references;
 mod resampling;
 mod support;
+#[path = "../../../tests/support/trials.rs"]
+mod trials;
 mod turns;

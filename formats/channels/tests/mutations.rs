@@ -17,7 +17,7 @@ use runout_core::{
     stage::{Request, Source},
 };
 
-use crate::support::{all_assets, campaign, opened};
+use crate::support::{all_assets, campaign, opened, written};
 
 /// Longer is a hang.
 const LONGEST: Duration = Duration::from_secs(5);
@@ -177,7 +177,7 @@ fn mutate(format: &str, files: usize) {
     let (mut read, mut longest, mut most_kb) = (0, Duration::ZERO, 0);
     for (place, bytes) in assets.iter().cycle().take(files) {
         let bytes = random.mutated(bytes);
-        fs::write(place, &bytes).unwrap();
+        written(place, &bytes);
         let taken = check(place, bytes.len());
         read += usize::from(taken.is_read);
         (longest, most_kb) = (longest.max(taken.time), most_kb.max(taken.kb));
@@ -197,7 +197,7 @@ fn a_text_that_is_said_to_be_longer_than_its_file_is_left_out_at_once() {
     let path = folder.path().join("long.h5");
     let whole = fs::read(crate::support::assets().join("datasets.h5")).unwrap();
     let texts = |bytes: &[u8]| {
-        fs::write(&path, bytes).unwrap();
+        written(&path, bytes);
         let units = |file: &dyn ChannelFile| file.channels().iter().filter(|channel| channel.unit.is_some()).count();
         opened(&path).ok().map(|file| units(&*file))
     };

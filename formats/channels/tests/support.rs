@@ -60,3 +60,9 @@ pub(crate) fn bits(values: &[f64]) -> Vec<u64> {
 pub(crate) fn is_text(path: &Path) -> bool {
     path.extension().is_some_and(|end| ["csv", "lvm", "txt", "uff"].iter().any(|text| end == *text))
 }
+
+/// Writes a file that may be there already. Over one that is cut to nothing first, ext4 waits for the disk each time.
+pub(crate) fn written(path: &Path, bytes: &[u8]) {
+    let _ = fs::remove_file(path);
+    fs::write(path, bytes).unwrap();
+}

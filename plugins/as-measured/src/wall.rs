@@ -132,25 +132,3 @@ fn sections(z_mm: &[f64], radius_mm: f64) -> std::result::Result<(Vec<usize>, Ve
     }
     Ok((order, traces))
 }
-
-#[cfg(test)]
-mod tests {
-    #![allow(clippy::unwrap_used, reason = "tests")]
-
-    use super::*;
-
-    #[test]
-    fn heights_are_sections_or_a_helix() {
-        let three: Vec<f64> = (0..30).map(|index| [5.0, 1.0, 9.0][index % 3] + 1e-4 * (index % 2) as f64).collect();
-        let (order, traces) = sections(&three, 20.0).unwrap();
-        let named: Vec<(&str, std::ops::Range<usize>)> =
-            traces.iter().map(|trace| (trace.id.as_str(), trace.points.clone())).collect();
-        assert_eq!(named, [("z=1.000", 0..10), ("z=5.000", 10..20), ("z=9.000", 20..30)]);
-        assert_eq!(order[..3], [1, 4, 7]);
-        let helix: Vec<f64> = (0..500).map(|index| 0.01 * f64::from(index)).collect();
-        assert_eq!(sections(&helix, 20.0).unwrap().1[0].id, "helix");
-        let scattered: Vec<f64> = (0..500).map(|index| f64::from(index * 7919 % 500) * 0.01).collect();
-        assert!(sections(&scattered, 20.0).unwrap_err().contains("scattered"));
-        assert_eq!(sections(&[1.0; 9], 20.0).unwrap().1[0].id, "circle");
-    }
-}

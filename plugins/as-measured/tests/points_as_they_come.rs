@@ -100,3 +100,29 @@ fn units_of_any_length_and_rounded_grids() {
     let both = written(folder.path(), "both.csv", "x_mm,y_mm,height_um,height [mm]\n0,0,1,2\n");
     assert!(run(&both, "form = 'none'").unwrap_err().contains("could be `height_nm`"));
 }
+
+/// Heights without names of circles: those of three circles in any order, of a helix, scattered ones, and one height.
+#[test]
+fn heights_are_sections_or_a_helix() {
+    let folder = tempfile::tempdir().unwrap();
+    let of = |turn_points: usize, count: usize, height: &dyn Fn(usize) -> f64| {
+        let mut text = String::from("angle_deg,z_mm,radius_mm\n");
+        for index in 0..count {
+            let angle = 360.0 * (index % turn_points) as f64 / turn_points as f64;
+            let radius = 20.0 + 2.5e-3 * (2.0 * angle.to_radians()).cos();
+            writeln!(text, "{angle:.6},{:.6},{radius:.7}", height(index)).unwrap();
+        }
+        run(&written(folder.path(), "wall.csv", &text), "object = 'cylinder'")
+    };
+    let names = |summary: &Summary| summary.stations.iter().map(|one| one.station.clone()).collect::<Vec<_>>();
+    // Point by point another circle, each wavering by 0.1 µm.
+    let three = of(120, 360, &|index| [5.0, 1.0, 9.0][index / 120] + 1e-4 * (index % 2) as f64).unwrap();
+    assert_eq!(names(&three), ["z=1.000", "z=5.000", "z=9.000"]);
+    near(&rons(&three), 5.0);
+    let helix = of(100, 500, &|index| 0.01 * index as f64).unwrap();
+    assert!(names(&helix).iter().all(|name| name.contains("helix")), "{:?}", names(&helix));
+    let scattered = of(100, 500, &|index| (index * 7919 % 500) as f64 * 0.01).unwrap_err();
+    assert!(scattered.contains("scattered"), "{scattered}");
+    let one = of(120, 120, &|_| 1.0).map(|summary| names(&summary));
+    assert!(one.as_ref().is_ok_and(|names| *names == ["circle"]), "{one:?}");
+}

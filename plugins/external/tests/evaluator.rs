@@ -97,8 +97,8 @@ fn one_that_fails_is_an_error_of_the_run() {
         (
             "title = json",
             "import time; time.sleep(600)\n        title = json",
-            "timeout_s = 5",
-            "gave no answer within 5 s",
+            "timeout_s = 3",
+            "gave no answer within 3 s",
         ),
         (
             "largest, ront = {}, []",

@@ -41,9 +41,9 @@ fn each_is_an_error_in_words() {
     let Some(python) = python() else { return };
     let script = support::of_repository("plugins/external/tests/hostile.py").display().to_string();
     let cases = [
-        ("hangs", "timeout_s = 2", "gave no answer within 2 s and was stopped"),
-        ("hangs-with-a-child", "timeout_s = 2", "gave no answer within 2 s"),
-        ("never-reads", "timeout_s = 2", "gave no answer within 2 s"),
+        ("hangs", "timeout_s = 1", "gave no answer within 1 s and was stopped"),
+        ("hangs-with-a-child", "timeout_s = 1", "gave no answer within 1 s"),
+        ("never-reads", "timeout_s = 1", "gave no answer within 1 s"),
         ("exits", "", "ended with exit status: 1 and gave no answer; its stderr ends with: the probe of section a is"),
         ("exits-well", "", "closed its output and gave no answer"),
         ("garbage", "", "wrote \"separating station 1 ...\\n\" to stdout"),

@@ -89,11 +89,11 @@ fn content(recording: &dyn Recording, rig: &Rig) -> (serde_json::Value, Vec<f64>
     (json!(captures), samples)
 }
 
-fn run(python: &str, folder: &Path, script: &str) -> Result<Summary, Error> {
+fn run(python: &str, folder: &Path, script: &str, timeout_s: f64) -> Result<Summary, Error> {
     fs::write(folder.join("own.py"), script).unwrap();
     let rig = rig("cw");
     let text = format!(
-        "rig = {rig}\n[load]\nplugin = \"external\"\ncommand = [{python:?}, \"own.py\"]\npath = \"turns.bin\"\ngives = \"samples\"\ntimeout_s = 10\n\
+        "rig = {rig}\n[load]\nplugin = \"external\"\ncommand = [{python:?}, \"own.py\"]\npath = \"turns.bin\"\ngives = \"samples\"\ntimeout_s = {timeout_s}\n\
          [[preprocess]]\nplugin = \"synchronous-average\"\nsamples_per_rev = 128\n[separate]\nplugin = \"three-point\"\n\
          [[export]]\nplugin = \"parquet\"\npath = \"out\"\n"
     );
@@ -107,7 +107,7 @@ fn the_same_samples_give_the_same_result() {
     let simulated = pipeline(folder.path(), &rig("cw"), "[separate]\nplugin = \"three-point\"\n");
     write(&folder.path().join("turns.bin"), &simulated);
     let expected = simulated.run().unwrap();
-    let found = run(&python, folder.path(), SCRIPT).unwrap();
+    let found = run(&python, folder.path(), SCRIPT, 10.0).unwrap();
     assert_eq!(found.stations.len(), 3);
     let values = |summary: &Summary| -> Vec<(String, f64)> {
         summary.all_values().iter().map(|placed| (placed.id().to_string(), placed.value.value)).collect()
@@ -158,12 +158,14 @@ fn what_cannot_be_is_an_error_in_words() {
             "frame(b\"samples\", pa.table(dict(zip(sensors, np.inf * samples.T))))",
             "gave inf in row 1 of the column `S1`",
         ),
-        (samples, "import time; time.sleep(600)", "gave no answer within 10 s"),
+        (samples, "import time; time.sleep(600)", "gave no answer within 3 s"),
         (samples, "sink.write(b\"samples 10000000000\\n\"); sink.flush()", "larger than 64 MB"),
         (samples, "sys.exit(3)", "ended with exit status: 3"),
     ] {
         assert!(SCRIPT.contains(from), "{from}");
-        let error = run(&python, folder.path(), &SCRIPT.replace(from, to)).unwrap_err();
+        // The one that sleeps is waited for.
+        let timeout_s = if to.contains("sleep") { 3.0 } else { 10.0 };
+        let error = run(&python, folder.path(), &SCRIPT.replace(from, to), timeout_s).unwrap_err();
         println!("{error}");
         assert!(error.to_string().contains(expected) && error.to_string().contains("turns.bin"), "{expected}: {error}");
         assert!(error.advice().is_some_and(|advice| !advice.is_empty()));

@@ -2,7 +2,10 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
-use crate::common::{CUT, diagnose, listing, scenario, separator};
+use crate::{
+    common::{CUT, diagnose, listing, scenario, separator},
+    trials::trials,
+};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -33,9 +36,9 @@ fn textured(mut grid: HeightGrid, seed: u64, [rows, columns]: [usize; 2]) -> Hei
 
 #[test]
 fn texture_is_no_line_of_the_spindle() {
-    let (mut lines, maps) = (0, 4);
-    for seed in 0..maps {
-        let reach = [[25, 3], [8, 2], [40, 6], [3, 2]][seed as usize % 4];
+    // The longest and the shortest reach in a usual run.
+    let (mut lines, maps) = (0, trials(4));
+    for (seed, reach) in [(2, [40, 6]), (3, [3, 2]), (0, [25, 3]), (1, [8, 2])].into_iter().take(maps) {
         let found =
             diagnose(textured(scenario(100, "noise_nm = 1.0").heights().unwrap(), seed, reach), &separator(CUT));
         let own = found.diagnosis.added.iter().filter(|one| one.effect == "spindle-line").count();
@@ -44,13 +47,13 @@ fn texture_is_no_line_of_the_spindle() {
         lines += own;
         assert!(said > 0, "{reach:?} {seed}");
     }
-    assert!(lines <= 1, "{lines} lines in {maps} maps");
+    assert!(4 * lines <= maps, "{lines} lines in {maps} maps");
 }
 
 /// Of 33 passes a period: of faster lines the deepest passes cut the others away, and little is left on the surface.
 #[test]
 fn a_line_in_texture_is_found() {
-    for (seed, amplitude) in [(11, 25.0), (12, 40.0)] {
+    for (seed, amplitude) in [(11, 25.0), (12, 40.0)].into_iter().take(trials(2)) {
         let line = format!(
             "noise_nm = 1.0\n[[effect]]\nplugin = 'spindle-line'\nfrequency_ratio = 0.03\namplitude_nm = {amplitude}\n"
         );

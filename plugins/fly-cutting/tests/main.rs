@@ -6,3 +6,5 @@ mod fly_config;
 mod fly_loop;
 mod fly_surface;
 mod fly_texture;
+#[path = "../../../tests/support/trials.rs"]
+mod trials;

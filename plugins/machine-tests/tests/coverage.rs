@@ -14,6 +14,8 @@ use runout_core::{
 };
 use runout_machine_tests::{CircularConfig, PositioningConfig};
 
+use crate::trials::fewest;
+
 struct Chance(ChaCha8Rng);
 
 impl Chance {
@@ -85,7 +87,7 @@ impl Axis {
 #[test]
 fn intervals_of_positioning_hold_the_truth() {
     let targets: Vec<f64> = (0..11).map(|index| 50.0 * f64::from(index) + 3.0 * f64::from(index * index % 7)).collect();
-    let trials = 100;
+    let trials = crate::trials::trials(100) as u32;
     let mut worst = f64::INFINITY;
     for runs in [2, 5, 10] {
         for (noise_um, of_run_um) in [(0.05, 0.0), (0.5, 0.0), (0.2, 0.5), (2.0, 0.0)] {
@@ -109,12 +111,14 @@ fn intervals_of_positioning_hold_the_truth() {
             println!("{runs} runs, noise {noise_um} µm, of a run {of_run_um} µm: {}", shares.join(", "));
         }
     }
-    assert!(worst >= 0.8, "{worst}");
+    // Of few runs some hold 90 %.
+    let least = fewest(trials as usize, [80, 100], 0.9) as f64 / f64::from(trials);
+    assert!(worst >= least, "{worst}");
 }
 
 #[test]
 fn intervals_of_circles_hold_the_truth() {
-    let trials = 16;
+    let trials = crate::trials::trials(16) as u32;
     let (mut all, mut kept) = (0.0, 0.0);
     for turns in [2, 3, 5] {
         for (noise_um, of_turn_um) in [(0.1, 0.0), (0.5, 0.0), (0.1, 0.5)] {
@@ -163,7 +167,9 @@ fn intervals_of_circles_hold_the_truth() {
         }
     }
     println!("all: {:.1} %", 100.0 * kept / all);
-    assert!(kept >= 0.93 * all, "{kept} of {all}");
+    // 2 % of all in the full study, and more by the root of the number in a part of it.
+    let share = 0.95 - 0.02 * f64::sqrt(16.0 / f64::from(trials));
+    assert!(kept >= share * all, "{kept} of {all}");
 }
 
 /// Repeatability is one number for the whole travel: where approaches scatter more at one end, the data contradict it.

@@ -2,7 +2,10 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
-use crate::common::{COMPONENTS, LOCATION, PLACEMENT, THREE_BALLS, scenario, separator, value};
+use crate::{
+    common::{COMPONENTS, LOCATION, PLACEMENT, THREE_BALLS, scenario, separator, value},
+    trials::{is_full, trials},
+};
 use runout_core::{
     closed_loop::{
         Settings,
@@ -130,10 +133,12 @@ const CASES: [Case; 11] = [
     },
 ];
 
+/// In a usual run small and large by turns.
 #[test]
 fn each_effect_is_named_at_its_size_and_the_location_stays_right() {
-    for case in &CASES {
-        for size in case.sizes {
+    for (index, case) in CASES.iter().enumerate() {
+        for size in if is_full() { &case.sizes[..] } else { &case.sizes[index % 2..=index % 2] } {
+            let size = *size;
             let found = diagnosed(THREE_BALLS, CONFIG, &format!("{PASSES}seed = 5\n{}", (case.keys)(size)));
             let added = &found.diagnosis.added;
             let shown: Vec<String> = added
@@ -205,7 +210,7 @@ fn balls_at_one_height_do_not_show_squareness_to_z() {
 #[test]
 fn clean_campaigns_name_nothing() {
     let (mut named, mut doubted) = (0, 0);
-    for seed in 0..50 {
+    for seed in 0..trials(50) {
         let found = diagnosed(THREE_BALLS, CONFIG, &format!("{PASSES}back_and_forth = true\nseed = {seed}"));
         named += found.diagnosis.added.len();
         if !found.diagnosis.added.is_empty() {

@@ -14,3 +14,5 @@ mod nest;
 mod paper;
 mod passes;
 mod published;
+#[path = "../../../tests/support/trials.rs"]
+mod trials;

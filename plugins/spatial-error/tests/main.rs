@@ -9,4 +9,6 @@ mod peers;
 mod searched;
 mod separate;
 mod support;
+#[path = "../../../tests/support/trials.rs"]
+mod trials;
 mod wandering;

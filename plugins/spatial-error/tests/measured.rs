@@ -2,7 +2,10 @@
 
 #![allow(clippy::unwrap_used, reason = "tests")]
 
-use crate::support::{column, scenario, separator, table, value};
+use crate::{
+    support::{column, scenario, separator, table, value},
+    trials::trials,
+};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
@@ -103,7 +106,8 @@ fn at_least_one_component_is_needed() {
 fn intervals_hold_beside_a_constant_component() {
     let mut held = [0.0; 3];
     let mut asked = 0.0;
-    for seed in 0..8 {
+    let campaigns = trials(8);
+    for seed in 0..campaigns as u64 {
         let layout = Layout::Scattered { from_mm: [0.0, 0.0, 40.0], to_mm: [520.0, 430.0, 40.0], count: 90 };
         let mut scenario = Scenario { layout, passes: 1, ..scenario(600 + seed) };
         scenario.tracker.noise_um = 2.5;
@@ -125,7 +129,10 @@ fn intervals_hold_beside_a_constant_component() {
             }
         }
     }
-    assert!(held.iter().all(|held| (0.9..0.995).contains(&(held / asked))), "{held:?} of {asked}");
+    // Places of a campaign share its errors: of fewer campaigns the share scatters with the root of their number.
+    let wider = f64::sqrt(8.0 / campaigns as f64);
+    let bounds = 0.95 - 0.05 * wider..0.95 + 0.045 * wider;
+    assert!(held.iter().all(|held| bounds.contains(&(held / asked))), "{held:?} of {asked}");
 }
 
 /// Noise of 1 µm is stated, and each place is off by 18 µm of its own: no axis takes this away.

@@ -13,4 +13,6 @@ mod methods;
 mod plan;
 mod separation;
 mod stated;
+#[path = "../../../tests/support/trials.rs"]
+mod trials;
 mod unusual;

@@ -2,7 +2,10 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
-use crate::common::{Campaign, ground, rms};
+use crate::{
+    common::{Campaign, ground, rms},
+    trials::trials,
+};
 use runout_core::{
     closed_loop::{Settings, diagnosis::Diagnosis},
     consistency::{Check, Test},
@@ -69,7 +72,7 @@ fn a_gain_beside_a_walk_is_found() {
 
 #[test]
 fn independent_errors_raise_no_finding_and_a_loud_trace_is_named() {
-    let (mut said, campaigns) = (0, 12);
+    let (mut said, campaigns) = (0, trials(12).max(6) as u64);
     for seed in 0..campaigns {
         let campaign = ground(500 + seed, [[3, 3], [2, 2], [4, 1]][seed as usize % 3]);
         let checks = separator().separated(&campaign.points()).unwrap().checks;

@@ -2,7 +2,10 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
-use crate::common::{Campaign, Shot, ground, rms};
+use crate::{
+    common::{Campaign, Shot, ground, rms},
+    trials::trials,
+};
 use runout_core::closed_loop::{Settings, diagnosis::Diagnosis};
 use runout_straightness::{AxialReversal, AxialReversalConfig, Straightness};
 
@@ -43,7 +46,7 @@ fn named(diagnosis: &Diagnosis) -> Vec<Vec<String>> {
 /// Waves of the slide of 1.2, 2 and 5 times its cut-off, a hundred times the noise: nothing is there to be found, and errors are those of noise.
 #[test]
 fn a_slide_with_waves_near_its_cutoff_lacks_nothing() {
-    for seed in 0..6 {
+    for seed in 0..trials(6) as u64 {
         let mut campaign = ground(20 + seed, [3, 3]);
         campaign.noise_um = 0.05;
         campaign.length_mm = 300.0;
@@ -92,7 +95,8 @@ fn shifted_traces_are_found_and_corrected() {
 /// stated uncertainty.
 #[test]
 fn shifts_of_all_traces_leave_a_stated_uncertainty() {
-    let (mut held, mut worse, campaigns) = (0, 0, 6);
+    // Both signs, and one more.
+    let (mut held, mut worse, campaigns) = (0, 0, trials(6).max(3) as u64);
     for seed in 0..campaigns {
         let mut campaign = ground(100 + seed, [3, 3]);
         let shifts = [0.12, -0.07, 0.04, -0.17, 0.09, -0.05];
@@ -165,7 +169,7 @@ fn traces_that_lack_nothing_raise_no_alarm() {
         [([3, 3], None), ([2, 2], None), ([4, 1], None), ([1, 1], Some(25.0)), ([3, 2], Some(25.0))]
             .into_iter()
             .cycle()
-            .take(20)
+            .take(trials(20))
             .enumerate()
     {
         let campaign = ground(40 + seed as u64, repeats);

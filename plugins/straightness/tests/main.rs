@@ -5,3 +5,5 @@ mod common;
 mod consistency;
 mod diagnose;
 mod reversal;
+#[path = "../../../tests/support/trials.rs"]
+mod trials;

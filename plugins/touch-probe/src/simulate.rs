@@ -334,19 +334,3 @@ impl StageConfig for TouchProbeScenario {
         Ok(Box::new(TouchProbeSimulator { scenario: self, text }))
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// With symmetric seats, the travel repeats after 120°, and is largest and smallest towards a seat and away from it.
-    #[test]
-    fn three_seats_make_three_lobes() {
-        let probe = Probe { seats_deg: [90.0, 210.0, 330.0], preload_at_mm: [0.0; 2], ..Probe::default() };
-        let travel = |degrees: f64| probe.travel_um(degrees.to_radians());
-        for degrees in [0.0, 17.0, 90.0] {
-            assert!((travel(degrees) - travel(degrees + 120.0)).abs() < 1e-6);
-        }
-        assert!((travel(90.0) - travel(150.0)).abs() > 5.0, "{} {}", travel(90.0), travel(150.0));
-    }
-}

@@ -2,7 +2,10 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
-use crate::support::{config, scenario, setups};
+use crate::{
+    support::{config, scenario, setups},
+    trials::{is_full, trials},
+};
 use runout_core::{
     closed_loop::{
         Settings,
@@ -37,7 +40,7 @@ fn named(diagnosis: &Diagnosis) -> Vec<String> {
 
 #[test]
 fn clean_campaigns_name_nothing() {
-    for seed in 0..12 {
+    for seed in 0..trials(12) as u64 {
         let found = diagnosed(&turned(seed), 15, None).diagnosis;
         println!("{seed}: {:?} {:?} {:.3?}", found.verdict, named(&found), found.before.chi2_per_dof);
         assert_eq!(named(&found), [""; 0], "{seed}");
@@ -47,7 +50,7 @@ fn clean_campaigns_name_nothing() {
 
 type Change = fn(&mut TouchProbeScenario, f64);
 
-/// Each effect at about its usual size and at 20 times it: named alone, its parameter within four standard uncertainties. Of a drift of
+/// Each effect at about its usual size and at 20 times it (in a usual run by turns at one of them): named alone, its parameter within four standard uncertainties. Of a drift of
 /// the centre, a sixth is in each of six setups; the rest is their centring.
 #[test]
 fn every_effect_is_named_with_its_size() {
@@ -62,7 +65,9 @@ fn every_effect_is_named_with_its_size() {
         ("thermal-drift radius", 2.0, |scenario, size| scenario.drift.radius_um = size),
     ];
     for (index, (name, usual, change)) in effects.into_iter().enumerate() {
-        for size in [usual, 20.0 * usual] {
+        let sizes = [usual, 20.0 * usual];
+        for size in if is_full() { &sizes[..] } else { &sizes[index % 2..=index % 2] } {
+            let size = *size;
             let mut scenario = turned(100 + index as u64);
             change(&mut scenario, size);
             let found = diagnosed(&scenario, 15, None).diagnosis;
@@ -153,6 +158,10 @@ fn strangers_are_unexplained_and_blame_nothing() {
         ("slipped between repeats", |scenario, size| scenario.strangers.slipped = Some((2, 1, 40.0 * size))),
     ];
     for (index, (name, change)) in strangers.into_iter().enumerate() {
+        // A wide chip and a stylus bent in three lobes are of the kind of those before them.
+        if !is_full() && [1, 4].contains(&index) {
+            continue;
+        }
         let size = [1.0, 2.0][index % 2];
         let mut scenario = turned(300 + index as u64);
         scenario.ring.random_rms_um = 2.5;

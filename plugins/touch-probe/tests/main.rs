@@ -7,3 +7,5 @@ mod example;
 mod lost;
 mod separate;
 mod support;
+#[path = "../../../tests/support/trials.rs"]
+mod trials;

@@ -159,4 +159,51 @@ mod tests {
             .collect();
         assert_eq!(shown, ["core: ", "plugins/a: core", "plugins/b: core plugins/a"]);
     }
+
+    /// A library that is not tested has no test that would never run, and one without examples none that nobody compiles.
+    #[test]
+    fn nothing_that_is_left_out_of_the_tests_has_any() {
+        let root = crate::process::root();
+        let mut left_out = [0, 0];
+        for folder in Manifest::read(&root).unwrap().folders(&root) {
+            let manifest = Manifest::read(&root.join(&folder)).unwrap();
+            let is_off = |what: &str| manifest.entries("lib").any(|entry| entry == (what, "false"));
+            let [tests, examples] = [is_off("test"), is_off("doctest")];
+            // What a program of tests takes from `src` is tested in it.
+            let program = fs::read_to_string(root.join(&folder).join("tests/main.rs")).unwrap_or_default();
+            for (path, text) in texts(&root.join(&folder).join("src")) {
+                let place = path.display();
+                let is_taken = path
+                    .file_name()
+                    .is_some_and(|name| program.contains(&format!("#[path = \"../src/{}\"]", name.to_string_lossy())));
+                assert!(!tests || is_taken || !text.contains("#[test]"), "{place}: its tests are not run");
+                assert!(!examples || !has_example(&text), "{place}: its examples are not compiled");
+            }
+            left_out[0] += usize::from(tests);
+            left_out[1] += usize::from(examples);
+        }
+        assert!(left_out.iter().all(|count| *count > 0), "{left_out:?}");
+    }
+
+    /// Whether a block of code in the documentation is a program: rustdoc takes one without a language for Rust.
+    fn has_example(text: &str) -> bool {
+        let lines = text.lines().map(str::trim_start);
+        let docs = lines.filter_map(|line| line.strip_prefix("///").or_else(|| line.strip_prefix("//!")));
+        let opening = docs.filter_map(|line| line.trim().strip_prefix("```")).step_by(2);
+        opening.into_iter().any(|language| !["text", "toml"].contains(&language))
+    }
+
+    /// Texts of all files of a folder and those within it.
+    fn texts(folder: &Path) -> Vec<(std::path::PathBuf, String)> {
+        let mut found = Vec::new();
+        for path in fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path()) {
+            if path.is_dir() {
+                found.extend(texts(&path));
+            } else {
+                let text = fs::read_to_string(&path).unwrap_or_default();
+                found.push((path, text));
+            }
+        }
+        found
+    }
 }

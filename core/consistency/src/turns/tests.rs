@@ -3,7 +3,11 @@
 use std::f64::consts::TAU;
 
 use super::*;
-use crate::{check::Test, testing::Random};
+use crate::{
+    check::Test,
+    testing::Random,
+    trials::{fewest, trials},
+};
 
 const SAMPLES: usize = 48;
 
@@ -231,15 +235,15 @@ fn a_phase_is_as_large_as_it_is_said_to_be() {
     let ratios = [1.0001, 1.00014, 0.9995, 1.0005, 1.003, 1.021, 0.97, 1.05];
     let steps = steps_deg.map(|by_deg: f64| (Trouble::Step(by_deg.to_radians()), by_deg.to_radians()));
     for (trouble, by_rad) in steps.into_iter().chain(ratios.map(|ratio| (Trouble::Ratio(ratio), TAU * (1.0 - ratio)))) {
-        let (mut held, mut said) = (0, 0);
-        for trial in 0..40 {
+        let (mut held, mut said, trials) = (0, 0, trials(40));
+        for trial in 0..trials {
             let recording = Recording { turns: 60, channels: 4, ..Recording::any(&mut random, 6 * trial) };
             let Some(phase) = recording.record(&mut random, trouble).course().phase else { continue };
             said += 1;
             held += usize::from((phase.by_rad - by_rad).abs() < 3.0 * phase.std_rad);
             assert!((phase.by_rad - by_rad).abs() < 0.2 * by_rad.abs() + 3.0 * phase.std_rad, "{trouble:?}: {phase:?}");
         }
-        println!("simulated, {trouble:?}: said {said} of 40, within 3 std {held}");
-        assert!(said >= 20 && held * 100 >= 85 * said, "{trouble:?}: {held} of {said}");
+        println!("simulated, {trouble:?}: said {said} of {trials}, within 3 std {held}");
+        assert!(2 * said >= trials && held >= fewest(said, [85, 100], 0.95), "{trouble:?}: {held} of {said}");
     }
 }

@@ -22,7 +22,10 @@ use runout_spindle::{
 };
 
 use super::{CLEAN_UM, diagnosed};
-use crate::campaigns::{averaged, campaign, two_sections};
+use crate::{
+    campaigns::{averaged, campaign, two_sections},
+    trials::trials,
+};
 
 /// A campaign with three sensors in each of two sections: every mistake in one channel shows by itself.
 fn six(seed: u64, effects: &str) -> SpindleConfig {
@@ -113,7 +116,7 @@ fn six_sensors_name_every_mistake() {
             "setups.1.part_deg = -99.844\nsetups.2.part_deg = -202.5",
         ),
     ] {
-        for seed in 1..=2 {
+        for seed in 1..=trials(2) as u64 {
             let config = six(seed, &format!("[{effect}]"));
             let (found, [_, after]) = names(&config, &[mistake], &[change]);
             assert!(found.diagnosis.added[0].confounded_with.is_empty(), "{:?}", found.diagnosis.added);
@@ -330,7 +333,8 @@ fn nothing_else_is_taken_for_a_mistake() {
 #[test]
 fn a_wrong_gain_is_no_mistake_to_a_run() {
     let mut said = Vec::new();
-    for seed in 0..24 {
+    // Every gain and every sensor.
+    for seed in 0..trials(24) as u64 {
         let sensor = 1 + seed % 4;
         let gain = [0.02, -0.05, 0.1, -0.15, 0.25, -0.3][seed as usize % 6];
         let effect = format!(r#"[{{"plugin":"sensor-gain","targets":["S{sensor}"],"relative_gain":{gain}}}]"#);
