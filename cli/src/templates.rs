@@ -6,6 +6,7 @@ pub(crate) const TEMPLATES: [(&str, &str); 25] = [
     ("axial-reversal", include_str!("templates/axial-reversal.toml")),
     ("donaldson-reversal", include_str!("templates/donaldson-reversal.toml")),
     ("external", include_str!("templates/external.toml")),
+    ("flatness", include_str!("templates/flatness.toml")),
     ("fly-cutting", include_str!("templates/fly-cutting.toml")),
     ("four-sensor-reversal", include_str!("templates/four-sensor-reversal.toml")),
     ("harmonic-least-squares", include_str!("templates/harmonic-least-squares.toml")),

@@ -441,6 +441,16 @@ class SpatialError:
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
+class Flatness:
+    """Flatness of a surface plate from slopes along lines that cross (Moody), by an autocollimator or a level"""
+
+    plugin: ClassVar[str] = "flatness"
+
+    std_urad: Union[float, None] = None
+    """Standard uncertainty of one reading, in µrad; without it, what the lines leave where they cross shows it."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
 class FlyCutting:
     """What a fly-cut surface has beside its scallops, and the motion of the spindle in it"""
 

@@ -10,7 +10,7 @@ use runout_core::{
         Effect, Parameter,
         linear_terms::{Declared, LinearFit, LinearTerms, Observations, Term},
     },
-    consistency::Structure,
+    consistency::{Kind, Structure},
     draws::{Draw, Truth, measured_again, seed, without_noise},
     fault::Fault,
     numerics::least_squares::{Basis, dot},
@@ -160,9 +160,13 @@ impl LinearModel for Flatness {
             values: steps.slope_urad.clone(),
             unit: "urad".into(),
             std: self.0.std_urad,
-            group: steps.line.clone(),
-            groups: steps.lines.iter().map(|line| format!("line {line}")).collect(),
+            // A line that is left out has no zero: steps are.
+            group: steps.step.clone(),
+            groups: (0..=steps.step.iter().copied().max().unwrap_or(0))
+                .map(|step| format!("step {}", step + 1))
+                .collect(),
             structure: Structure::default()
+                .divided("lines", Kind::Blocks, steps.line.clone(), steps.lines.clone())
                 .along("the line", steps.line.clone(), steps.step.iter().map(|step| *step as f64).collect())
                 .naming(names),
             ..Observations::default()
@@ -186,10 +190,11 @@ impl LinearModel for Flatness {
         let left = fit.residual();
         let dof = left.len().saturating_sub(readings.rank()).max(1);
         let found_urad = (dot(&left, &left) / dof as f64).sqrt();
-        // More than is stated is never less.
+        // What the tests of the readings widen heights by; more than is stated is never less.
+        let wider = fit.judgement().factors.iter().take(free.len()).copied().fold(1.0, f64::max);
         let (std_urad, freedom) = match self.0.std_urad {
-            Some(stated) if stated >= found_urad => (stated, 0),
-            _ => (found_urad, dof),
+            Some(stated) if stated >= found_urad => (wider * stated, 0),
+            _ => (wider * found_urad, dof),
         };
         // What one reading does to the heights, `[reading][node]`.
         let weights = readings.weights();

@@ -1,6 +1,5 @@
 //! Means of passes over their width, bin by bin along y: what tests of independence are made on. Material has a texture: neighbouring
-//! points are not independent, means of a pass depend on each other along it, and passes are independent. Each mean is scaled so that
-//! all have one variance, whatever the number of their points.
+//! points are not independent, means of a pass depend on each other along it, and passes are independent.
 
 use std::f64::consts::TAU;
 
@@ -38,8 +37,6 @@ pub(crate) struct Cells {
     first: i32,
     passes: usize,
     bins: usize,
-    /// Points of a mean, harmonic: by which its variance is smaller.
-    averaged: f64,
 }
 
 impl Cells {
@@ -73,9 +70,7 @@ impl Cells {
             cells.push(Cell { y_mm: cell.y_mm / cell.points, angle: cell.angle / cell.points, ..cell });
         }
         of.iter_mut().for_each(|index| *index = place[*index]);
-        let inverse: f64 = cells.iter().map(|cell| cell.points.recip()).sum();
-        let averaged = cells.len() as f64 / inverse.max(f64::MIN_POSITIVE);
-        Self { all: cells, of, first, passes, bins, averaged }
+        Self { all: cells, of, first, passes, bins }
     }
 
     /// Passes from the first to the last.
@@ -83,12 +78,12 @@ impl Cells {
         self.passes
     }
 
-    /// Points by which the variance of a scaled mean is smaller than that of a point.
+    /// Points of a mean, harmonic: by which its variance is smaller.
     pub(crate) fn averaged(&self) -> f64 {
-        self.averaged
+        self.all.len() as f64 / self.all.iter().map(|cell| cell.points.recip()).sum::<f64>().max(f64::MIN_POSITIVE)
     }
 
-    /// Scaled means of values at the points.
+    /// Means of values at the points.
     pub(crate) fn means(&self, values: &[f64]) -> Vec<f64> {
         let mut sums = vec![0.0; self.all.len()];
         for (index, value) in self.of.iter().zip(values) {
@@ -96,7 +91,7 @@ impl Cells {
                 *sum += value;
             }
         }
-        sums.iter().zip(&self.all).map(|(sum, cell)| sum / (cell.points * self.averaged).sqrt()).collect()
+        sums.iter().zip(&self.all).map(|(sum, cell)| sum / cell.points).collect()
     }
 
     /// The group of passes that a pass is in.
@@ -112,16 +107,18 @@ impl Cells {
         if self.passes > MOST_GROUPS { "groups of passes" } else { "passes" }
     }
 
-    /// What is declared of the means.
+    /// What is declared of the means. Passes have unequal numbers of points: their scatter is not compared.
     pub(crate) fn structure(&self) -> Structure {
-        let numbered = |count: usize| (1..=count).map(|number| format!("pass {number}")).collect::<Vec<String>>();
-        let passes: Vec<usize> = self.all.iter().map(|cell| cell.pass).collect();
         let groups = self.all.iter().map(|cell| self.group(cell.pass)).collect();
+        let names = (1..=self.groups()).map(|number| format!("pass {number}")).collect();
         let halves: Vec<usize> = self.all.iter().map(|cell| usize::from(2 * cell.bin >= self.bins)).collect();
         Structure::default()
-            .along("y", passes.clone(), self.all.iter().map(|cell| cell.y_mm).collect())
-            .divided(self.groups_name(), Kind::Blocks, groups, numbered(self.groups()))
-            .divided("passes", Kind::Alike, passes, numbered(self.passes))
+            .along(
+                "y",
+                self.all.iter().map(|cell| cell.pass).collect(),
+                self.all.iter().map(|cell| cell.y_mm).collect(),
+            )
+            .divided(self.groups_name(), Kind::Blocks, groups, names)
             .shifting("halves", &halves, &["lower", "upper"].map(|half| format!("the {half} half of the map")))
     }
 

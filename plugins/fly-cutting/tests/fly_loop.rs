@@ -18,9 +18,9 @@ fn clean_surfaces_name_nothing() {
     }
 }
 
-/// Passes at the edge of the map, and narrow ones, have means of fewer points.
+/// Passes at the edge of the map, and narrow ones, have fewer points.
 #[test]
-fn passes_of_unequal_width_scatter_alike() {
+fn passes_of_unequal_width_are_no_finding() {
     let mut said = Vec::new();
     for seed in 0..6 {
         for line in [0.0, 20.0] {

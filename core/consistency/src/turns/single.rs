@@ -29,7 +29,8 @@ pub(super) fn look(table: &TurnTable, course: &mut TurnCourse) {
     let apart = found.rows.iter().filter(|row| sizes[**row] > APART * farthest);
     let said: Vec<String> =
         apart.map(|row| format!("turn {} by {:.1} times", table.turns[*row] + 1, sizes[*row])).collect();
-    course.checks.push(if said.is_empty() { check } else { check.finding(|| words(&said)) });
+    // The variance of the mean includes them.
+    course.checks.push(if said.is_empty() { check } else { check.finding(|| words(&said)).named() });
 }
 
 fn words(said: &[String]) -> String {
