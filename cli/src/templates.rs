@@ -1,7 +1,7 @@
 //! Pipelines to start from, one a separator: `runout new` writes them.
 
 /// Names of separators with the text of a pipeline that passes `runout check`.
-pub(crate) const TEMPLATES: [(&str, &str); 25] = [
+pub(crate) const TEMPLATES: [(&str, &str); 26] = [
     ("as-measured", include_str!("templates/as-measured.toml")),
     ("axial-reversal", include_str!("templates/axial-reversal.toml")),
     ("donaldson-reversal", include_str!("templates/donaldson-reversal.toml")),

@@ -27,6 +27,9 @@ impl Steps {
         let column = |name: &str| points.column(name);
         let [x0, y0, x1, y1] = [column("from_x_mm")?, column("from_y_mm")?, column("to_x_mm")?, column("to_y_mm")?];
         let length_mm: Vec<f64> = (0..x0.len()).map(|row| (x1[row] - x0[row]).hypot(y1[row] - y0[row])).collect();
+        if length_mm.is_empty() {
+            return Err(refuse(points, "there is no reading".into()));
+        }
         if let Some(row) = length_mm.iter().position(|length| *length <= 0.0) {
             return Err(refuse(points, format!("row {}: both feet stand at one place", row + 1)));
         }

@@ -168,6 +168,7 @@ fn a_drift_is_found_with_its_size_and_a_clean_plate_names_nothing() {
 #[test]
 fn what_the_lines_do_not_show_is_refused() {
     let said = |rows: &Rows| run(rows, Some(0.1)).unwrap_err().to_string();
+    assert!(said(&Rows(Vec::new())).contains("there is no reading"));
     let one = Rows::of(&LINES[2..3], 0.1, 0.0, 1);
     assert!(said(&one).contains("all places lie on one line"), "{}", said(&one));
     // Two edges that no line joins.
