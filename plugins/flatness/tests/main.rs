@@ -12,9 +12,6 @@ use runout_core::{
 };
 use runout_flatness::FlatnessConfig;
 
-#[path = "../../../tests/support/trials.rs"]
-mod trials;
-
 /// Corners, middles of the edges and the centre of a plate of 800 mm x 600 mm: lines in steps of 100 mm.
 const LINES: [(&str, [f64; 2], [f64; 2]); 8] = [
     ("AC", [0.0, 0.0], [800.0, 600.0]),
@@ -138,18 +135,18 @@ fn intervals_hold_the_truth() {
     let truth = truth();
     for (noise_urad, is_stated) in [(0.2, true), (0.2, false), (3.0, true), (3.0, false)] {
         let mut held = [0; 5];
-        let count = trials::trials(150);
-        for seed in 0..count as u64 {
+        let trials = 150;
+        for seed in 0..trials {
             let found = run(&Rows::of(&LINES, noise_urad, 0.0, seed), is_stated.then_some(noise_urad)).unwrap();
             for ((held, value), truth) in held.iter_mut().zip(&found.values).zip(truth) {
                 let [low, high] = value.interval_95().unwrap();
-                *held += usize::from(low <= truth && truth <= high);
+                *held += u32::from(low <= truth && truth <= high);
             }
         }
-        println!("noise {noise_urad} µrad, stated {is_stated}: {held:?} of {count}");
+        let shares = held.map(|held| 100.0 * f64::from(held) / f64::from(u32::try_from(trials).unwrap()));
+        println!("noise {noise_urad} µrad, stated {is_stated}: {shares:.1?} %");
         // 95 % of 150 are known to 1.8 %.
-        let fewest = trials::fewest(count, [134, 150], 0.95);
-        assert!(held.iter().all(|held| *held >= fewest), "{noise_urad} {is_stated}: {held:?} of {count}");
+        assert!(shares.iter().all(|share| *share >= 89.0), "{noise_urad} {is_stated}: {shares:?}");
     }
 }
 
