@@ -179,8 +179,8 @@ impl Rows {
     }
 }
 
-/// Rows named one by one at most.
-const MOST_NAMED: usize = 5;
+/// Readings or turns named one by one at most.
+pub(crate) const MOST_NAMED: usize = 5;
 
 #[cfg(test)]
 mod tests {

@@ -40,6 +40,10 @@ enum Noise {
     Scatter,
     /// Of each position and its neighbours, as readings that were interpolated.
     Correlated,
+    /// Independent, known, and eleven times as large at the end as at the beginning.
+    Uneven,
+    /// Known, and beside them a bow of the whole profile, of random size and as large.
+    Common,
 }
 
 const NOISES: [Noise; 3] = [Noise::Known, Noise::Scatter, Noise::Correlated];
@@ -74,6 +78,19 @@ fn errors(noise: Noise, std_um: f64, seed: u64) -> (Vec<f64>, OpenErrors) {
     let exact = OpenErrors { std_um: vec![std_um; POINTS], ..OpenErrors::default() };
     match noise {
         Noise::Known => (white[..POINTS].iter().map(|one| std_um * one).collect(), exact),
+        Noise::Uneven => {
+            let std_um: Vec<f64> =
+                (0..POINTS).map(|at| std_um * (1.0 / 6.0 + 10.0 / 6.0 * at as f64 / POINTS as f64)).collect();
+            let errors = white.iter().zip(&std_um).map(|(one, std)| std * one).collect();
+            (errors, OpenErrors { std_um, ..exact })
+        }
+        Noise::Common => {
+            let change: Vec<f64> =
+                (0..POINTS).map(|at| 3.0 * std_um * (2.0 * at as f64 / POINTS as f64 - 1.0).powi(2)).collect();
+            let size: f64 = StandardNormal.sample(&mut random);
+            let errors = white.iter().zip(&change).map(|(one, change)| std_um * one + size * change).collect();
+            (errors, OpenErrors { common_um: vec![change], ..exact })
+        }
         Noise::Scatter => {
             let chi2 = ChiSquared::new(4.0).unwrap();
             let stated = (0..POINTS).map(|_| std_um * (chi2.sample(&mut random) / 4.0_f64).sqrt()).collect();
@@ -139,7 +156,16 @@ fn shares(shape: Shape, noise: Noise, std_um: f64, trials: u64, text: &str) -> S
 
 #[test]
 fn intervals_of_straightness_hold_the_truth() {
-    for (noise, std_um) in [(Noise::Known, 0.01), (Noise::Scatter, 0.02), (Noise::Correlated, 0.02)] {
+    // From a noise far below the form to one as large.
+    let noises = [
+        (Noise::Known, 0.01),
+        (Noise::Known, 0.5),
+        (Noise::Scatter, 0.02),
+        (Noise::Correlated, 0.02),
+        (Noise::Uneven, 0.05),
+        (Noise::Common, 0.05),
+    ];
+    for (noise, std_um) in noises {
         let all = shares(Shape::Waves, noise, std_um, 60, "values = ['straightness']");
         for (name, stated, inside) in all {
             // 95 % of 60 are 57 ± 1.7; four of those below it.

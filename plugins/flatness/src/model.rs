@@ -78,7 +78,8 @@ fn table() -> TableSpec {
         "heights above the least-squares plane, at the feet along each line",
         vec![
             ColumnSpec::name("line", "id of the line"),
-            ColumnSpec::number("along_mm", "mm", "distance from the first foot of the line").repeating(),
+            ColumnSpec::number("along_mm", "mm", "distance along the line, in the direction of the carriage")
+                .repeating(),
             ColumnSpec::number("x_mm", "mm", "place"),
             ColumnSpec::number("y_mm", "mm", "place"),
             ColumnSpec::number("height_um", "um", "height above the least-squares plane"),
@@ -151,9 +152,7 @@ impl LinearModel for Flatness {
             return Err(refuse(points, problem)
                 .help("lines have to cross at common places: diagonals, edges and centre lines (Moody)"));
         }
-        // The same from step to step of every line: of time, or of the air along the beam.
-        let drift: Vec<f64> = steps.step.iter().map(|step| *step as f64).collect();
-        let term = |effect: Effect| Term { effect, columns: vec![drift.clone()], rank: 0 };
+        let term = |effect: Effect| Term { effect, columns: vec![steps.drift()], rank: 0 };
         let rows = steps.line.iter().zip(&steps.step);
         let names = rows.map(|(line, step)| format!("step {} of line {}", step + 1, steps.lines[*line])).collect();
         let observations = Observations {
@@ -178,7 +177,9 @@ impl LinearModel for Flatness {
     fn outcome(&self, points: &Points, fit: &LinearFit) -> Result<Outcome> {
         let steps = Steps::of(points)?;
         let (free, declared) = declared(&steps, steps.datum(points)?);
-        let readings = Basis::of(declared.into_iter().map(|one| one.column).collect());
+        // Heights beside a drift that is fitted are less certain.
+        let drifts = fit.effects().filter(|(effect, ..)| !fit.knows(&effect.id)).map(|_| steps.drift());
+        let readings = Basis::of(declared.into_iter().map(|one| one.column).chain(drifts).collect());
         let plane = plane(&steps.nodes_mm);
         let heights = |parameters: &[f64]| {
             let mut heights_um = vec![0.0; steps.nodes_mm.len()];
@@ -237,18 +238,9 @@ impl LinearModel for Flatness {
 }
 
 fn rows(steps: &Steps, heights_um: &[f64], variance: &[f64]) -> Result<TableRows> {
-    let mut each: Vec<(usize, f64, usize)> = Vec::new();
-    for line in 0..steps.lines.len() {
-        let mut along_mm = 0.0;
-        let of_line = (0..steps.feet.len()).filter(|row| steps.line[*row] == line);
-        for (place, row) in of_line.enumerate() {
-            if place == 0 {
-                each.push((line, 0.0, steps.feet[row][0]));
-            }
-            along_mm += steps.length_mm[row];
-            each.push((line, along_mm, steps.feet[row][1]));
-        }
-    }
+    let each: Vec<(usize, f64, usize)> = (0..steps.lines.len())
+        .flat_map(|line| steps.along(line).into_iter().map(move |(mm, node)| (line, mm, node)))
+        .collect();
     let spec = table();
     let rows = spec.rows(vec![
         texts(each.iter().map(|(line, ..)| steps.lines[*line].as_str())),

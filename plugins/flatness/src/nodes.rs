@@ -58,6 +58,28 @@ impl Steps {
         Ok(Self { nodes_mm, feet, length_mm, line, step, lines, slope_urad: column("slope_urad")?.to_vec() })
     }
 
+    /// What one unit of a drift from step to step adds to each reading, the same in every line: of time, or of the air along the beam.
+    pub(crate) fn drift(&self) -> Vec<f64> {
+        self.step.iter().map(|step| *step as f64).collect()
+    }
+
+    /// Nodes of a line with their distances along it, in mm, in the direction from the rear to the front foot.
+    pub(crate) fn along(&self, line: usize) -> Vec<(f64, usize)> {
+        let feet: Vec<[usize; 2]> =
+            self.feet.iter().zip(&self.line).filter(|(_, own)| **own == line).map(|(feet, _)| *feet).collect();
+        let [rear, front] = feet[0].map(|node| self.nodes_mm[node]);
+        let length = (front[0] - rear[0]).hypot(front[1] - rear[1]);
+        let place = |node: usize| {
+            let [x, y] = self.nodes_mm[node];
+            ((x - rear[0]) * (front[0] - rear[0]) + (y - rear[1]) * (front[1] - rear[1])) / length
+        };
+        let mut nodes: Vec<(f64, usize)> = feet.into_iter().flatten().map(|node| (place(node), node)).collect();
+        nodes.sort_by(|a, b| a.0.total_cmp(&b.0));
+        nodes.dedup_by_key(|(_, node)| *node);
+        let first = nodes[0].0;
+        nodes.into_iter().map(|(along, node)| (along - first, node)).collect()
+    }
+
     /// Three nodes whose heights are taken as 0: slopes do not show the plane, and each line has a zero of its own.
     pub(crate) fn datum(&self, points: &Points) -> Result<[usize; 3]> {
         let farthest = |from: &dyn Fn([f64; 2]) -> f64| {

@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests; shares are printed")]
 
+use arrow_array::Float64Array;
 use runout_core::{
     Result,
     closed_loop::{Settings, diagnosis::Verdict},
@@ -127,7 +128,14 @@ fn a_plate_without_noise_has_its_heights() {
     for (value, truth) in found.values.iter().zip(truth()) {
         assert!((value.value - truth).abs() < 1e-6 + 1e-4 * truth, "{}: {} for {truth}", value.symbol, value.value);
     }
-    assert_eq!(found.tables[0].rows.num_rows(), 2 * (2 * 11 + 3 * 9 + 3 * 7));
+    let rows = &found.tables[0].rows;
+    assert_eq!(rows.num_rows(), 2 * (2 * 11 + 3 * 9 + 3 * 7));
+    // A line has its places and heights in one order, there and back.
+    for name in ["along_mm", "x_mm", "y_mm", "height_um"] {
+        let column = rows.column_by_name(name).unwrap().as_any().downcast_ref::<Float64Array>().unwrap().values();
+        let (there, back) = (&column[..11], &column[11..22]);
+        assert!(there.iter().zip(back).all(|(there, back)| (there - back).abs() < 1e-9), "{name}: {there:?} {back:?}");
+    }
 }
 
 #[test]

@@ -1,13 +1,13 @@
 //! What readings that were repeated say of themselves: the tests of [`consistency`](runout_core::consistency), which contradict values.
 
 use runout_core::{
-    consistency::{Action, Check, Judgement, Kind, LinearFit, Structure, Test, judge, rows},
+    consistency::{Action, Check, Judgement, Kind, LinearFit, Shift, Structure, Test, judge, rows},
     numerics::least_squares::Basis,
 };
 
 use crate::runs::{Approaches, mean};
 
-/// Series that are looked at: more show no more.
+/// Series that are looked at, evenly taken of more.
 const MOST_SERIES: usize = 20;
 /// Parts of the travel whose scatter is compared.
 const PARTS: usize = 4;
@@ -19,10 +19,12 @@ pub(crate) struct Said {
     pub checks: Vec<Check>,
 }
 
-/// Numbers that were taken one after the other, in series of their own: whether they depend on those beside them, and whether a single one is
-/// unlike the others. A finding contradicts the values.
+/// Numbers that were taken one after the other, in series of their own: whether they depend on those beside them, whether they drift from the
+/// first to the last, and whether a single one is unlike the others. A finding contradicts the values.
 pub(crate) fn in_order(what: &str, series: &[(&str, &[f64])], unit: &str) -> Vec<Check> {
-    contradicting(Series::of(&series[..series.len().min(MOST_SERIES)]).judged(what, unit, false).checks)
+    let taken: Vec<(&str, &[f64])> =
+        series.iter().step_by(series.len().div_ceil(MOST_SERIES).max(1)).copied().collect();
+    contradicting(Series::of(&taken).judged(what, unit, false).checks)
 }
 
 /// Findings that no wider uncertainty answers: the values are no means.
@@ -61,7 +63,13 @@ impl<'a> Series<'a> {
     fn judged(&self, what: &str, unit: &str, has_means: bool) -> Judgement {
         let means: Vec<f64> = self.all.iter().map(|(_, of)| mean(of)).collect();
         let residual: Vec<f64> = self.place.iter().map(|(own, at)| self.all[*own].1[*at] - means[*own]).collect();
-        let structure = Structure::default()
+        let ramp = |(own, at): &(usize, usize)| *at as f64 / (self.all[*own].1.len() - 1).max(1) as f64;
+        let drift = Shift {
+            name: what.to_owned(),
+            levels: ["first", "last"].map(|end| format!("the {end} of {what}")).to_vec(),
+            columns: vec![self.place.iter().map(ramp).collect()],
+        };
+        let structure = Structure { shifts: vec![drift], ..Structure::default() }
             .along(
                 what,
                 self.place.iter().map(|(own, _)| *own).collect(),

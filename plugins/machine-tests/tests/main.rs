@@ -11,8 +11,3 @@ mod structural;
 mod support;
 #[path = "../../../tests/support/trials.rs"]
 mod trials;
-
-// Modules that need nothing else of the crate: for their tests the library is not compiled a second time.
-#[allow(dead_code, unreachable_pub, reason = "a part of the library")]
-#[path = "../src/runs.rs"]
-mod runs;

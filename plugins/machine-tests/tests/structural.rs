@@ -4,6 +4,7 @@
 
 use std::f64::consts::TAU;
 
+use runout_core::consistency::Check;
 use runout_machine_tests::StructuralMotionConfig;
 
 use crate::support::{Chance, Held, Rows, separated, value};
@@ -43,6 +44,8 @@ fn a_window_has_its_peak_to_valley() {
     assert!((motion.std().unwrap() - expected).abs() < 1e-12);
     assert!((motion.interval_95().unwrap()[1] - 3.5 - 2.571 * expected).abs() < 1e-3);
     assert!((value(&found, "structural-motion-max", "X").value - 6.0).abs() < 1e-12);
+    let changes = |check: &Check| check.refutes() && check.finding.starts_with("X: the last of the windows differs");
+    assert!(found.checks.iter().any(changes), "{:?}", found.checks);
     assert!(
         found.remarks.iter().any(|remark| remark.starts_with("Z: all windows have the same")),
         "{:?}",

@@ -1,16 +1,14 @@
-//! Single turns that are not like the others: a knock, a chip below a sensor. The covariance of the mean includes them, as it includes any
+//! Single turns that are not like the others: a knock, a chip below a sensor, the start of a filter. The covariance of the mean includes them, as it includes any
 //! asynchronous motion; here they are named.
 
 use super::{TurnCourse, TurnTable, mean};
 use crate::{
     check::{Check, Test},
-    rows,
+    rows::{self, MOST_NAMED},
 };
 
 /// A turn is named where it is so many times as far off as the farthest of the others: asynchronous motion swells over several turns.
 const APART: f64 = 2.0;
-/// Turns named one by one at most.
-const MOST_NAMED: usize = 5;
 
 /// Looks at all low orders of each turn together. Means of neighbouring turns are left alone: no single turn stands out of them.
 pub(super) fn look(table: &TurnTable, course: &mut TurnCourse) {
@@ -37,7 +35,7 @@ fn words(said: &[String]) -> String {
     let more = if said.len() > MOST_NAMED { format!(" and {} more", said.len() - MOST_NAMED) } else { String::new() };
     let named = said[..said.len().min(MOST_NAMED)].join(", ");
     format!(
-        "single turns differ from the mean by more than the scatter of the others: {named}{more}; was there a knock, a chip or dirt?"
+        "single turns differ from the mean by more than the scatter of the others: {named}{more}; was there a knock, a chip, or a filter that had not settled?"
     )
 }
 
