@@ -1,7 +1,8 @@
 //! Open profiles: errors at positions along a line, and what they do to values.
 //!
-//! A parabola and the line through both ends are taken out, so that the profile closes on itself: it is then read as a closed one is. Errors are drawn at the
-//! positions, where they may differ in size, depend on each other and have common changes.
+//! A parabola and the line through both ends are taken out, so that the profile closes on itself: its forms are then those of a closed one. No noise is taken out of
+//! what is evaluated, as it is of closed profiles: where the ends meet, that would round them off (STRp at an end was then too small, its interval right in 86 %).
+//! Errors are drawn at the positions, where they may differ in size, depend on each other and have common changes.
 
 use std::f64::consts::TAU;
 
@@ -72,10 +73,8 @@ impl OpenErrors {
         }
         let squares = vec![errors.squares; variance.len()];
         let section = Section::of(&Measured { harmonics, variance, squares, lowest: 1 }, false);
-        let [mut found, mut processed] = [Vec::new(), Vec::new()];
+        let mut found = Vec::new();
         look(profile_um, &mut found);
-        let smoothed = Closed { taken_um: taken_um.clone(), harmonics: section.processed(&section.found) };
-        look(&closing.opened(&smoothed), &mut processed);
         let mut sides: Vec<[Sides; 2]> = found.iter().map(|_| [Sides::default(), Sides::default()]).collect();
         let draws = (POINTS_DRAWN / (4 * profile_um.len())).clamp(FEWEST_DRAWS, DRAWS);
         let [mut of_truth, mut of_again] = [Vec::new(), Vec::new()];
@@ -89,7 +88,7 @@ impl OpenErrors {
                 };
                 let again = Closed {
                     taken_um: sum(&truth.taken_um, &of_measurement.taken_um),
-                    harmonics: section.processed(&sum(&truth.harmonics, &of_measurement.harmonics)),
+                    harmonics: sum(&truth.harmonics, &of_measurement.harmonics),
                 };
                 for (closed, found) in [(truth, &mut of_truth), (again, &mut of_again)] {
                     found.clear();
@@ -100,9 +99,8 @@ impl OpenErrors {
                 }
             }
         }
-        let all = found.into_iter().zip(processed).zip(sides);
         let refuted = section.refutes_noise;
-        Some(all.map(|((found, processed), sides)| Interval::of(found, processed, sides, refuted)).collect())
+        Some(found.into_iter().zip(sides).map(|(found, sides)| Interval::of(found, found, sides, refuted)).collect())
     }
 
     /// Power of the correlated errors of variance 1 at a phase step per position, in that of independent ones.
