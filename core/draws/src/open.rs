@@ -52,6 +52,13 @@ impl OpenErrors {
         positions > 1 && known(&self.std_um) && self.common_um.iter().all(known)
     }
 
+    /// Mean of the variances at the positions.
+    #[must_use]
+    pub fn mean_square_um2(&self) -> f64 {
+        let of_common = self.common_um.iter().flatten().map(|change| change * change).sum::<f64>();
+        (self.std_um.iter().map(|std| std * std).sum::<f64>() + of_common) / self.std_um.len() as f64
+    }
+
     /// What is known of values of a profile, at equal distances or nearly so; `look` adds the same ones, of any number, of a profile. `None`
     /// where the errors are not known at all of its positions, or are all 0.
     #[must_use]

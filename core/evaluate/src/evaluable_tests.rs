@@ -1,4 +1,5 @@
 //! Values of open profiles and height maps beside brute force, and how often their intervals hold the truth.
+//! Long because all of them simulate the same open profiles and maps.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests; one prints a table for the documentation")]
 

@@ -13,6 +13,15 @@ use runout_standards::{
 
 /// Points that a profile needs for texture.
 const FEWEST: usize = 7;
+/// Places of Rq, and of Rsk and Rku, in [`texture::PARAMETERS`].
+const RQ: usize = 1;
+const SHAPE: [usize; 2] = [2, 3];
+/// Share of the errors in the square of Rq up to which intervals of Rsk and Rku of a line hold the truth; at 3 %, 90 %
+/// (`intervals_of_open_texture_by_noise`, a step beside weak waves).
+const SHAPE_SHOWN: f64 = 0.01;
+/// Why there is none beyond.
+const HIDDEN: &str = "errors are more than 1 % of the square of Rq: they hide how the weak waves of a line lie to each other, on which it depends";
+
 /// Its values, and what they are not.
 pub(super) fn values(profile: &OpenProfile, evaluate: &Evaluate) -> (Vec<Value>, Vec<String>) {
     let (mut values, mut remarks) = (Vec::new(), Vec::new());
@@ -105,12 +114,17 @@ pub(super) fn texture_along(
     let look = |profile_um: &[f64], values: &mut Vec<f64>| {
         values.extend(texture::along(z_mm, profile_um, settings).values());
     };
-    let found = found(profile_um, errors, seed, look).into_iter().enumerate();
-    let with_reason = |(index, found): (usize, NumberFound)| match no_interval(index).filter(|_| errors.is_ok()) {
-        Some(reason) => found.without_uncertainty(reason),
-        None => found,
-    };
-    found.map(with_reason).collect()
+    let mut found = found(profile_um, errors, seed, look);
+    if let Ok(errors) = errors {
+        let hides_shape = errors.mean_square_um2() > SHAPE_SHOWN * found[RQ].value.powi(2);
+        for (index, found) in found.iter_mut().enumerate() {
+            let reason = if SHAPE.contains(&index) && hides_shape { Some(HIDDEN) } else { no_interval(index) };
+            if let Some(reason) = reason {
+                *found = found.clone().without_uncertainty(reason);
+            }
+        }
+    }
+    found
 }
 
 /// Values of a profile, each with what is known of its error, or why nothing is.
