@@ -14,6 +14,9 @@ use crate::{
 
 /// What builds the package, and what its tests take.
 const BUILD: &str = "maturin>=1.9,<2";
+/// Links to the C library of manylinux_2_28, older than that of the machine that builds: the wheel runs on every Linux since 2019.
+const LINKER: &str = "ziglang>=0.15";
+const LINKED: [&str; 3] = ["--zig", "--compatibility", "manylinux_2_28"];
 const TEST_PACKAGES: [&str; 16] = [
     "dask",
     "duckdb",
@@ -46,9 +49,14 @@ pub(crate) fn wheel(words: &[&str]) -> Outcome {
     if !environment.join("bin/maturin").is_file() {
         install(&environment, &[BUILD])?;
     }
+    let for_others = profile == "release" && cfg!(target_os = "linux");
+    if for_others && answer(environment.join("bin/python"), &["-c", "import ziglang"]).is_none() {
+        install(&environment, &[LINKER])?;
+    }
     let wheels = target().join("wheels");
     let mut build = Command::new(environment.join("bin/maturin"));
     build.args(["build", "--profile", profile, "--manifest-path"]).arg(root().join("python/Cargo.toml"));
+    build.args(LINKED.iter().filter(|_| for_others));
     build.env("CARGO_TARGET_DIR", target()).env("CMAKE", setup::ready()?);
     run(build.arg("--interpreter").arg(environment.join("bin/python")).arg("--out").arg(&wheels))?;
     say(&format!("pip install {}/runout-*.whl", wheels.display()));

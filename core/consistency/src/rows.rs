@@ -91,6 +91,78 @@ pub fn unlike(residual: &[f64], basis: &[Vec<f64>]) -> Option<Rows> {
     })
 }
 
+/// The same of readings that repeat places, each with a mean of its own: in a place whose squares are unlike those of the others (Cochran's
+/// test, ISO 5725-2) it is the reading farthest from the others there. Indices count all readings, place by place. `None` where too few are
+/// repeated.
+#[must_use]
+pub fn unlike_repeats(places: &[Vec<f64>]) -> Option<Rows> {
+    let mut first = 0;
+    let mut repeated = Vec::new();
+    for all in places {
+        let (count, sum) = (all.len() as f64, all.iter().sum::<f64>());
+        let off = |one: f64| one - sum / count;
+        let farthest = (0..all.len()).max_by(|one, other| off(all[*one]).abs().total_cmp(&off(all[*other]).abs()));
+        if let Some(reading) = farthest.filter(|_| all.len() > 1) {
+            repeated.push(Repeated {
+                row: first + reading,
+                off_by: off(all[reading]) * count / (count - 1.0),
+                squares: all.iter().map(|one| off(*one).powi(2)).sum(),
+                dof: count - 1.0,
+            });
+        }
+        first += all.len();
+    }
+    let (squares, dof) =
+        (repeated.iter().map(|one| one.squares).sum::<f64>(), repeated.iter().map(|one| one.dof).sum::<f64>());
+    if dof < FEWEST as f64 || squares <= 0.0 {
+        return None;
+    }
+    let count = repeated.len();
+    repeated.sort_by(|one, other| other.mean_square().total_cmp(&one.mean_square()));
+    let most = ((MOST * count as f64).ceil() as usize).clamp(1, MOST_SUSPECTS).min(count - 1);
+    // Noise and degrees of freedom behind each rank, from none left out to all suspects.
+    let mut behind = vec![(squares, dof)];
+    for one in &repeated[..most] {
+        let (squares, dof) = behind[behind.len() - 1];
+        behind.push(((squares - one.squares).max(0.0), dof - one.dof));
+    }
+    let ratio =
+        |rank: usize, at: usize| repeated[at].mean_square() * behind[rank].1 / behind[rank].0.max(f64::MIN_POSITIVE);
+    let tail =
+        |rank: usize, at: usize| (f_tail(ratio(rank, at), repeated[at].dof, behind[rank].1) * count as f64).min(1.0);
+    let apart = |rank: usize| {
+        repeated[rank - 1].mean_square() > (1.0 + (rank as f64).sqrt().recip()).powi(2) * repeated[rank].mean_square()
+    };
+    let named = (1..=most).rev().find(|rank| apart(*rank) && tail(*rank, rank - 1) < NAMED).unwrap_or(0);
+    let rank = named.max(1);
+    let chosen = &repeated[..named];
+    Some(Rows {
+        rows: chosen.iter().map(|one| one.row).collect(),
+        off_by: chosen.iter().map(|one| one.off_by).collect(),
+        farthest: ratio(rank, 0).sqrt(),
+        p: tail(rank, 0),
+        dof: behind[rank].1,
+        std: [(squares / dof).sqrt(), (behind[named].0 / behind[named].1).sqrt()],
+    })
+}
+
+/// A place with more than one reading.
+struct Repeated {
+    /// The reading farthest from the others.
+    row: usize,
+    /// From their mean.
+    off_by: f64,
+    /// Squares about the mean of all.
+    squares: f64,
+    dof: f64,
+}
+
+impl Repeated {
+    fn mean_square(&self) -> f64 {
+        self.squares / self.dof
+    }
+}
+
 /// Readings that a fit does better without, one after the other: each is that whose own column takes most of the residual, and the last one
 /// is the last whose chance is small. At least one.
 fn suspects(residual: &[f64], basis: &[Vec<f64>], dof: usize) -> Vec<usize> {
@@ -145,13 +217,6 @@ fn weighted(columns: &DMatrix<f64>, values: &DVector<f64>, weights: &DVector<f64
 }
 
 impl Rows {
-    /// The same of readings in another unit, of which `unit` are one of these.
-    #[must_use]
-    pub fn scaled(&self, unit: f64) -> Self {
-        let off_by = self.off_by.iter().map(|off| unit * off).collect();
-        Self { off_by, std: self.std.map(|std| unit * std), ..self.clone() }
-    }
-
     /// The test in words: which rows, how far off, and what they do to the noise.
     #[must_use]
     pub fn check(&self, structure: &Structure, unit: &str) -> Check {
@@ -245,6 +310,32 @@ mod tests {
             one += usize::from(left(values) == [trial]);
         }
         assert!(false_names < 4 && one > 95, "{false_names} {one}");
+    }
+
+    /// Places with a mean of their own: of three readings, of two, and of two to five.
+    #[test]
+    fn a_wild_reading_among_repeats_is_named_and_sound_ones_are_not() {
+        let mut random = Random::new(19);
+        for counts in [vec![3; 700], vec![2; 30], (0..40).map(|place| 2 + place % 4).collect::<Vec<usize>>()] {
+            let (mut false_names, mut one, mut three) = (0, 0, 0);
+            for _ in 0..200 {
+                let mut noise =
+                    |place: usize| (0..counts[place]).map(|_| place as f64 + 0.9 * random.normal()).collect();
+                let mut places: Vec<Vec<f64>> = (0..counts.len()).map(&mut noise).collect();
+                false_names += usize::from(!unlike_repeats(&places).unwrap().rows.is_empty());
+                let row = |place: usize, reading: usize| counts[..place].iter().sum::<usize>() + reading;
+                places[5][1] += 12.0;
+                let found = unlike_repeats(&places).unwrap();
+                // Which of two is wild, two do not say.
+                one += usize::from(found.rows == [row(5, 1)] || (counts[5] == 2 && found.rows == [row(5, 0)]));
+                places[9][1] -= 15.0;
+                places[13][0] += 20.0;
+                three += usize::from(unlike_repeats(&places).unwrap().rows.len() == 3);
+            }
+            assert!(false_names < 5 && one > 190, "{} places: {false_names} {one}", counts.len());
+            assert!(counts.len() < 100 || three > 190, "{} places: {three}", counts.len());
+        }
+        assert!(unlike_repeats(&[vec![1.0, 2.0], vec![3.0]]).is_none());
     }
 
     #[test]

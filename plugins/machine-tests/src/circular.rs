@@ -14,6 +14,7 @@ use std::f64::consts::TAU;
 
 use runout_core::{
     Complex64, Result,
+    consistency::Check,
     draws::{DrawnErrors, Draws, Interval, Measured, Uncertainty, seed},
     fault::Fault,
     numerics::fourier::Fourier,
@@ -29,7 +30,7 @@ use serde::Deserialize;
 
 use crate::{
     paths::{Paths, mean_of, refused},
-    repeated::in_order,
+    repeated::{in_order, single},
     runs::mean,
 };
 
@@ -125,6 +126,8 @@ impl PointSeparator for Circular {
         let radii: Vec<Vec<f64>> =
             paths.turns.iter().map(|turns| turns.iter().map(|turn| mean(turn)).collect()).collect();
         let series: Vec<(&str, &[f64])> = sides.zip(radii.iter().map(Vec::as_slice)).collect();
+        let mut checks = in_order("the turns", &series, "µm");
+        checks.extend(unlike(&paths));
         let named = |(index, (symbol, value, about)): (usize, (String, f64, &'static str))| {
             let known = known.get(index).and_then(|known| known.at(value));
             let known =
@@ -140,7 +143,7 @@ impl PointSeparator for Circular {
             ),
             tables: vec![rows(&paths, &of_means)?],
             values: values.into_iter().enumerate().map(named).collect(),
-            checks: in_order("the turns", &series, "µm"),
+            checks,
             remarks,
             ..Outcome::default()
         })
@@ -230,6 +233,22 @@ impl Circular {
         ));
         Some(values)
     }
+}
+
+/// Single readings that are not like those of the other turns at their angle.
+fn unlike(paths: &Paths) -> Option<Check> {
+    // Between two readings there is a line, in which both of them are seen again.
+    let angles: Vec<usize> = (0..paths.angles).step_by(paths.angles_a_reading).collect();
+    let at_angles = |turns: &Vec<Vec<f64>>| -> Vec<Vec<f64>> {
+        angles.iter().map(|angle| turns.iter().map(|turn| turn[*angle]).collect()).collect()
+    };
+    let places: Vec<Vec<f64>> = paths.turns.iter().flat_map(at_angles).collect();
+    let named = |place: usize, number: usize| {
+        let path = if paths.signs[place / angles.len()] > 0 { '+' } else { '-' };
+        let angle_deg = 360.0 * angles[place % angles.len()] as f64 / paths.angles as f64;
+        format!("turn {number} of the {path} path at {angle_deg}°")
+    };
+    single(&places, named, "µm")
 }
 
 /// Variance below which turns are copies: of rounding.

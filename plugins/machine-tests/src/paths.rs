@@ -21,6 +21,8 @@ pub(crate) fn refused(points: &Points, problem: String) -> Error {
 pub(crate) struct Paths {
     /// Equal angles of each path.
     pub angles: usize,
+    /// Angles a reading: more than 1 where there are fewer readings than angles.
+    pub angles_a_reading: usize,
     /// +1 counter-clockwise, −1 clockwise.
     pub signs: Vec<i8>,
     /// `[direction][turn][angle]`.
@@ -100,7 +102,7 @@ impl Paths {
         if left_out > 0 {
             remarks.push(format!("{left_out} turns that are not whole are left out"));
         }
-        Ok(Self { angles, signs, turns, remarks })
+        Ok(Self { angles, angles_a_reading: (angles / most.max(1)).max(1), signs, turns, remarks })
     }
 }
 

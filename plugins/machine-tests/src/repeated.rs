@@ -69,13 +69,14 @@ impl<'a> Series<'a> {
             levels: ["first", "last"].map(|end| format!("the {end} of {what}")).to_vec(),
             columns: vec![self.place.iter().map(ramp).collect()],
         };
-        let structure = Structure { shifts: vec![drift], ..Structure::default() }
+        let mut structure = Structure::default()
             .along(
                 what,
                 self.place.iter().map(|(own, _)| *own).collect(),
                 self.place.iter().map(|(_, at)| *at as f64).collect(),
             )
             .naming(self.place.iter().map(|(own, at)| format!("{} {}", self.all[*own].0, at + 1)).collect());
+        structure.shifts.push(drift);
         let fit = LinearFit {
             residual: &residual,
             basis: &self.columns(|count| count.sqrt().recip()),
@@ -142,24 +143,22 @@ pub(crate) fn approaches(of: &Approaches, along: &[f64], [place, unit]: [&str; 2
     let mut checks = judge(fit, &structure).checks;
     // Contrasts have no single approach.
     checks.retain(|check| check.test != Test::Rows);
-    checks.extend(single(of, runs, unit));
-    contradicting(checks)
+    let mut checks = contradicting(checks);
+    let places: Vec<Vec<f64>> = of.deviations.iter().flatten().cloned().collect();
+    let named = |place: usize, number: usize| {
+        let (target, side) = (of.targets[place / sides], of.sides[place % sides]);
+        format!("approach {number} of target {target} in direction {side:+}")
+    };
+    checks.extend(single(&places, named, unit));
+    checks
 }
 
-/// Single approaches that are not like the others of their target.
-fn single(of: &Approaches, runs: usize, unit: &str) -> Option<Check> {
-    let (mut left, mut names) = (Vec::new(), Vec::new());
-    for (target, of_target) in of.targets.iter().zip(&of.deviations) {
-        for (side, all) in of.sides.iter().zip(of_target) {
-            let middle = mean(all);
-            for (run, one) in all.iter().enumerate() {
-                left.push(one - middle);
-                names.push(format!("approach {} of target {target} in direction {side:+}", run + 1));
-            }
-        }
-    }
-    // A wild one moves the mean that it is measured from.
-    let unit_of_mean = runs as f64 / (runs as f64 - 1.0);
-    let found = rows::unlike(&left, &[])?.scaled(unit_of_mean);
-    Some(found.check(&Structure::default().naming(names), unit))
+/// Single readings that are not like the others of their place, of places that were read again and again. A finding contradicts the values.
+/// `named` is what a reading of a place is called, by its number.
+pub(crate) fn single(places: &[Vec<f64>], named: impl Fn(usize, usize) -> String, unit: &str) -> Option<Check> {
+    let of_place =
+        |(place, all): (usize, &Vec<f64>)| (1..=all.len()).map(|number| named(place, number)).collect::<Vec<String>>();
+    let names = places.iter().enumerate().flat_map(of_place).collect();
+    let found = rows::unlike_repeats(places)?;
+    contradicting(vec![found.check(&Structure::default().naming(names), unit)]).pop()
 }

@@ -172,6 +172,42 @@ fn intervals_of_circles_hold_the_truth() {
     assert!(kept >= share * all, "{kept} of {all}");
 }
 
+/// A reading that only one of the turns has is named, and contradicts the values; what whole turns are off by is not.
+#[test]
+fn a_spike_in_one_turn_is_said() {
+    let mut chance = Chance(ChaCha8Rng::seed_from_u64(31));
+    let mut said = |spike_um: f64| {
+        let mut one = || {
+            let mut columns = [("angle_deg", Vec::new()), ("deviation_um", Vec::new()), ("direction", Vec::new())];
+            for side in [1.0, -1.0] {
+                for turn in 0..3 {
+                    let off_um = 0.3 * chance.normal();
+                    for step in 0..360 {
+                        let angle = side * TAU * f64::from(step) / 360.0;
+                        let spiked = side > 0.0 && turn == 1 && step == 137;
+                        let form_um = 2.0 * (2.0 * angle).cos() + off_um * (angle + 0.4).sin();
+                        columns[0].1.push(angle.to_degrees());
+                        columns[1].1.push(form_um + 0.2 * chance.normal() + if spiked { spike_um } else { 0.0 });
+                        columns[2].1.push(side);
+                    }
+                }
+            }
+            let config = CircularConfig { plane: "XY".into(), radius_mm: 150.0, radius_std_um: 0.0 };
+            let context = Context { folder: std::path::Path::new("."), rig: None };
+            let found = outcome(config.check(&context).unwrap(), &columns);
+            let named = found.checks.iter().find(|check| check.refutes());
+            if let Some(check) = named.filter(|_| spike_um > 0.0) {
+                assert!(check.finding.contains("turn 2 of the + path at 137°"), "{}", check.finding);
+            }
+            named.is_some()
+        };
+        (0..40).filter(|_| one()).count()
+    };
+    let (sound, spiked) = (said(0.0), said(4.0));
+    println!("said of 40: sound {sound}, one reading off by 4 µm {spiked}");
+    assert!(sound <= 3 && spiked >= 38, "{sound} {spiked}");
+}
+
 /// Repeatability is one number for the whole travel: where approaches scatter more at one end, the data contradict it.
 #[test]
 fn scatter_that_grows_along_the_travel_is_said() {

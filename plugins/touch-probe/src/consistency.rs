@@ -3,7 +3,11 @@
 use std::f64::consts::TAU;
 
 use runout_core::{
-    consistency::{Check, Judgement, Kind, LinearFit, Structure, judge, linear, repeats::repeats, rows},
+    consistency::{
+        Check, Judgement, Kind, LinearFit, Structure, judge, linear,
+        repeats::repeats,
+        rows::{self, Rows},
+    },
     numerics::least_squares::{Basis, dot},
 };
 
@@ -102,7 +106,9 @@ impl Fitted {
         let dof = used.len().saturating_sub(basis.rank());
         let left = dot(&residual, &residual) / dof.max(1) as f64 / (scale * scale);
         if let Some(unlike) = self.unlike.as_ref().filter(|unlike| !unlike.rows.is_empty()) {
-            checks.insert(0, unlike.scaled(scale).check(&declared, "µm"));
+            let off_by = unlike.off_by.iter().map(|off| off * scale).collect();
+            let unlike = Rows { off_by, std: unlike.std.map(|std| std * scale), ..unlike.clone() };
+            checks.insert(0, unlike.check(&declared, "µm"));
         }
         match weights.noise {
             _ if dof == 0 => {}

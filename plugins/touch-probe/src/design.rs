@@ -95,7 +95,12 @@ impl Design {
         design
     }
 
-    fn add(&mut self, parameter: Parameter, column: Vec<f64>) {
+    /// A wave that is 0 at all touches but for their rounding (the sine of order 8 in 16 directions) would be a parameter of any size.
+    fn add(&mut self, parameter: Parameter, mut column: Vec<f64>) {
+        let is_wave = matches!(parameter, Parameter::Lobing { .. } | Parameter::Form { .. });
+        if is_wave && column.iter().all(|entry| entry.abs() < UNSEEN) {
+            column.fill(0.0);
+        }
         self.parameters.push(parameter);
         self.columns.push(column);
     }

@@ -166,3 +166,16 @@ fn orders_that_the_directions_do_not_determine_are_lost() {
     assert!(mean.std().unwrap() < 1.0, "{mean:?}");
     assert!(value(&outcome, "lobe_14_amplitude").value.is_nan());
 }
+
+/// In 16 directions, order 8 is a cosine alone: its sine is 0 at all touches but for their rounding, and each other order is read as one more.
+#[test]
+fn directions_that_determine_no_order_are_refused() {
+    let mut scenario = scenario(8, &setups(&[(0.0, 0.0), (100.0, 0.0), (217.0, 0.0)]));
+    scenario.directions = 16;
+    let points = scenario.touched().points();
+    let refused = config(&scenario, 15, None).separate(&points).unwrap_err();
+    assert!(refused.to_string().contains("do not determine orders up to 15"), "{refused}");
+    assert!(format!("{refused:?}").contains("at least 31 directions"), "{refused:?}");
+    let fewer = config(&scenario, 7, None).separate(&points).unwrap();
+    assert!(value(&fewer, "lobe_3_amplitude").std().unwrap() < 0.5);
+}
