@@ -44,16 +44,13 @@ impl Steps {
         };
         let feet = (0..x0.len()).map(|row| [node([x0[row], y0[row]]), node([x1[row], y1[row]])]).collect();
         let (mut lines, mut line, mut step): (Vec<String>, Vec<usize>, Vec<usize>) = Default::default();
-        let mut taken: Vec<usize> = Vec::new();
         for name in points.labels("line").unwrap_or_default() {
             let at = lines.iter().position(|known| known == name).unwrap_or_else(|| {
                 lines.push(name.clone());
-                taken.push(0);
                 lines.len() - 1
             });
+            step.push(line.iter().filter(|own| **own == at).count());
             line.push(at);
-            step.push(taken[at]);
-            taken[at] += 1;
         }
         Ok(Self { nodes_mm, feet, length_mm, line, step, lines, slope_urad: column("slope_urad")?.to_vec() })
     }
@@ -76,8 +73,7 @@ impl Steps {
         let mut nodes: Vec<(f64, usize)> = feet.into_iter().flatten().map(|node| (place(node), node)).collect();
         nodes.sort_by(|a, b| a.0.total_cmp(&b.0));
         nodes.dedup_by_key(|(_, node)| *node);
-        let first = nodes[0].0;
-        nodes.into_iter().map(|(along, node)| (along - first, node)).collect()
+        nodes.iter().map(|(along, node)| (along - nodes[0].0, *node)).collect()
     }
 
     /// Three nodes whose heights are taken as 0: slopes do not show the plane, and each line has a zero of its own.

@@ -136,7 +136,7 @@ impl PointSeparator for Circular {
             let named = named.of(&self.0.plane);
             if symbol.starts_with('G') || symbol == "H" { named.key() } else { named }
         };
-        Ok(Outcome {
+        let outcome = Outcome {
             convention: format!(
                 "deviation is radius less the nominal one of {} mm; + is counter-clockwise, from the first axis of {} towards the second",
                 self.0.radius_mm, self.0.plane
@@ -146,7 +146,8 @@ impl PointSeparator for Circular {
             checks,
             remarks,
             ..Outcome::default()
-        })
+        };
+        Ok(outcome.refuted())
     }
 }
 

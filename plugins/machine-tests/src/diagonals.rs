@@ -223,7 +223,7 @@ impl PointSeparator for Diagonals {
             );
         }
         said.extend(missing(&all));
-        Ok(Outcome {
+        let outcome = Outcome {
             convention:
                 "deviation is actual less commanded distance along the diagonal; + is an approach ahead along it".into(),
             tables: vec![rows(&all)?],
@@ -237,7 +237,8 @@ impl PointSeparator for Diagonals {
                 .collect(),
             remarks: said,
             ..Outcome::default()
-        })
+        };
+        Ok(outcome.refuted())
     }
 }
 

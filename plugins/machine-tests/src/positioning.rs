@@ -165,7 +165,7 @@ impl PointSeparator for Positioning {
             values.iter_mut().for_each(|value| value.uncertainty = None);
         }
         let terms = Terms { unit: deviation.unit, runs: RUNS, standard: "ISO 230-2", contain: "A and R contain it" };
-        Ok(Outcome {
+        let outcome = Outcome {
             convention: format!(
                 "deviation is actual less commanded position of {}; + is an approach in the positive direction",
                 self.0.axis
@@ -175,7 +175,8 @@ impl PointSeparator for Positioning {
             checks: repeated::approaches(&approaches, &noise.along, [target.unit, deviation.unit]),
             remarks: remarks(&approaches, &noise, &terms),
             ..Outcome::default()
-        })
+        };
+        Ok(outcome.refuted())
     }
 }
 

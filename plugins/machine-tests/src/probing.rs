@@ -188,7 +188,7 @@ impl Probing {
                 .push(format!("{count} touches of a sphere: P_FTU,3D is of {ON_SPHERE}; fewer find less of the form"));
         }
         let notes = vec![format!("{} sets of {count} touches", touches.sets.len())];
-        Ok(Outcome {
+        let outcome = Outcome {
             convention: "a deviation is the distance of a touch from the centre of its set less the mean radius".into(),
             tables: vec![rows(&touches)?],
             values,
@@ -196,7 +196,8 @@ impl Probing {
             remarks: said.remarks,
             notes,
             ..Outcome::default()
-        })
+        };
+        Ok(outcome.refuted())
     }
 
     /// The range of radial distances, mean over the sets.
@@ -273,14 +274,15 @@ fn single_points(points: &Points) -> Result<Outcome> {
         numbers(each.iter().map(|(_, touch, _)| *touch as f64)),
         numbers(each.iter().map(|(.., deviation)| *deviation)),
     ])?;
-    Ok(Outcome {
+    let outcome = Outcome {
         convention: "a range is of as many touches as there are".into(),
         tables: vec![TableRows { table: spec.name, rows }],
         values,
         checks: said.checks,
         remarks: said.remarks,
         ..Outcome::default()
-    })
+    };
+    Ok(outcome.refuted())
 }
 
 fn points_table() -> TableSpec {

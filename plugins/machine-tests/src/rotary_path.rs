@@ -378,7 +378,7 @@ impl PointSeparator for RotaryPath {
             let found = repeated::approaches(approaches, &noise.along, ["°", "µm"]);
             checks.extend(found.into_iter().map(|check| check.within(&of)));
         }
-        Ok(Outcome {
+        let outcome = Outcome {
             convention: format!(
                 "{test}: deviation is actual less nominal place of the ball; radial is away from the axis, tangential along its positive rotation; + is positive rotation"
             ),
@@ -387,6 +387,7 @@ impl PointSeparator for RotaryPath {
             checks,
             remarks: said,
             ..Outcome::default()
-        })
+        };
+        Ok(outcome.refuted())
     }
 }

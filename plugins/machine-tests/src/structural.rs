@@ -129,7 +129,7 @@ impl PointSeparator for StructuralMotion {
             numbers(each.iter().map(|(_, from, _)| *from)),
             numbers(each.iter().map(|(.., range)| *range)),
         ])?;
-        Ok(Outcome {
+        let outcome = Outcome {
             convention: "displacement of the tool against the workpiece, spindle still; as recorded, with what the sensors themselves make".into(),
             tables: vec![TableRows { table: spec.name, rows }],
             values,
@@ -137,7 +137,8 @@ impl PointSeparator for StructuralMotion {
             remarks: said.remarks,
             notes: vec![format!("{} windows of {} s", windows.len(), self.0.window_s)],
             ..Outcome::default()
-        })
+        };
+        Ok(outcome.refuted())
     }
 }
 

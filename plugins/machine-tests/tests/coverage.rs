@@ -198,6 +198,7 @@ fn a_spike_in_one_turn_is_said() {
             let named = found.checks.iter().find(|check| check.refutes());
             if let Some(check) = named.filter(|_| spike_um > 0.0) {
                 assert!(check.finding.contains("turn 2 of the + path at 137°"), "{}", check.finding);
+                assert!(found.values.iter().all(|value| value.refuted_by.is_some()));
             }
             named.is_some()
         };

@@ -4,7 +4,6 @@ use nalgebra::Vector3;
 use runout_core::{
     Error, ErrorKind, Result,
     component_curves::location_table,
-    consistency::refuted_by,
     points::{PointColumn, Points},
     stage::{
         Evaluable, EvaluableKind, Outcome, PointModel, PointPlan, PointSeparator, far_below_noise, residual_table,
@@ -203,8 +202,6 @@ impl RotaryAxis {
         values.extend(self.ranges(campaign, &left_out));
         values.extend(closing_errors(campaign, scale.factor * typical_um(campaign)));
         let checks = checks(axis, campaign, effects, &found);
-        let refuted = refuted_by(&checks);
-        values = values.into_iter().map(|value| value.refuted_by(refuted.clone())).collect();
         let mistake = if effects.is_empty() { self.mistake(points, found.chi2_per_dof().sqrt()) } else { None };
         let mut remarks: Vec<String> = mistake.into_iter().chain(campaign.warnings.iter().cloned()).collect();
         remarks.extend(self.lost(&found, campaign));
@@ -241,7 +238,8 @@ impl RotaryAxis {
         );
         let motion = || Evaluable::AxisMotion(axis_motion(axis, campaign, &found, &others, &scale));
         let evaluables = if self.evaluables().is_empty() { Vec::new() } else { vec![motion()] };
-        Ok(Outcome { convention, tables, values, checks, evaluables, remarks, notes, ..Outcome::default() })
+        let outcome = Outcome { convention, tables, values, checks, evaluables, remarks, notes, ..Outcome::default() };
+        Ok(outcome.refuted())
     }
 
     fn lost(&self, found: &Fit, campaign: &Campaign) -> Option<String> {

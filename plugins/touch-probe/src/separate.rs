@@ -3,7 +3,6 @@
 use runout_core::{
     Error, ErrorKind, Result,
     closed_loop::diagnosis::LostOrders,
-    consistency::refuted_by,
     fault::Fault,
     pipeline::{Context, StageConfig},
     points::{
@@ -274,9 +273,7 @@ impl TouchProbe {
         let checks = fit.judge(&self.0, touches, weights);
         let ranges = ranges(&self.0, touches, missing, content, readings_um, weights);
         let mut outcome = TouchSolution { config: &self.0, touches, fit: &fit, weights, ranges }.outcome()?;
-        let refuted = refuted_by(&checks);
-        outcome.values = outcome.values.into_iter().map(|value| value.refuted_by(refuted.clone())).collect();
         outcome.checks = checks;
-        Ok((fit, outcome))
+        Ok((fit, outcome.refuted()))
     }
 }

@@ -10,7 +10,7 @@ use runout_closed_loop::{
     diagnosis::{Diagnosis, LostOrders},
     linear_terms::{LinearFit, LinearTerms},
 };
-use runout_consistency::Check;
+use runout_consistency::{Check, refuted_by};
 use runout_error::Result;
 use runout_numerics::number::significant;
 use runout_table::{ColumnSpec, Figure, Measure, TableRows, TableSpec, counts, numbers, texts};
@@ -170,6 +170,26 @@ impl Outcome {
             _ => None,
         })
     }
+
+    /// Marks the values that its own checks refute: of a check of one part, the values of this part, by what they are of or by their symbol;
+    /// of a check of the whole, or where no value names the part, all.
+    #[must_use]
+    pub fn refuted(mut self) -> Self {
+        let names = |part: &str, name: &str| {
+            part.strip_prefix(name).is_some_and(|rest| rest.is_empty() || rest.starts_with([' ', '/']))
+        };
+        let is_of = |check: &Check, value: &Value| {
+            names(&check.part, &value.symbol) || value.of.as_deref().is_some_and(|of| names(&check.part, of))
+        };
+        let of_all: Vec<bool> =
+            self.checks.iter().map(|check| !self.values.iter().any(|value| is_of(check, value))).collect();
+        for value in &mut self.values {
+            let own = self.checks.iter().zip(&of_all).filter(|(check, of_all)| **of_all || is_of(check, value));
+            let own: Vec<Check> = own.map(|(check, _)| check.clone()).collect();
+            value.refuted_by = refuted_by(&own).or_else(|| value.refuted_by.take());
+        }
+        self
+    }
 }
 
 /// A domain whose declared model and effects are linear in their parameters.
@@ -203,7 +223,7 @@ impl<M: LinearModel> PointModel for M {
         after.tables.push(residual_rows(&terms, &closed.before, &closed.after)?);
         let mut diagnosis = closed.diagnosis;
         diagnosis.warnings.append(&mut after.remarks);
-        Ok(PointDiagnosis { diagnosis, after })
+        Ok(PointDiagnosis { diagnosis, after: after.refuted() })
     }
 }
 
@@ -217,7 +237,7 @@ pub fn separate_declared(model: &impl LinearModel, points: &Points) -> Result<Ou
     let mut outcome = model.outcome(points, &fit)?;
     outcome.checks.extend(fit.consistency());
     outcome.tables.push(residual_rows(&terms, &fit, &fit)?);
-    Ok(outcome)
+    Ok(outcome.refuted())
 }
 
 /// The residual of a linear model, reading by reading.
