@@ -56,7 +56,12 @@ pub(crate) fn wheel(words: &[&str]) -> Outcome {
     let wheels = target().join("wheels");
     let mut build = Command::new(environment.join("bin/maturin"));
     build.args(["build", "--profile", profile, "--manifest-path"]).arg(root().join("python/Cargo.toml"));
-    build.args(LINKED.iter().filter(|_| for_others));
+    if for_others {
+        // The linker is a module of the first Python there.
+        let path = std::env::var_os("PATH").unwrap_or_default();
+        let path = std::env::join_paths(std::iter::once(environment.join("bin")).chain(std::env::split_paths(&path)));
+        build.args(LINKED).env("PATH", path.map_err(|error| format!("PATH: {error}"))?);
+    }
     build.env("CARGO_TARGET_DIR", target()).env("CMAKE", setup::ready()?);
     run(build.arg("--interpreter").arg(environment.join("bin/python")).arg("--out").arg(&wheels))?;
     say(&format!("pip install {}/runout-*.whl", wheels.display()));

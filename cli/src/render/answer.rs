@@ -50,7 +50,7 @@ fn key_values(page: &mut Page, values: &[KeyValue]) {
     }
     page.headed_table("Key values", &table);
     if values.iter().any(|value| value.is_refuted) {
-        page.line(format_args!(" {REFUTED} the data contradict the ±, which is widened: no limit is proven by it"));
+        page.line(format_args!(" {REFUTED} the data contradict the ±: no limit is proven by it"));
     }
     if values.iter().flat_map(|value| &value.numbers).any(Number::is_outside) {
         page.line(format_args!(

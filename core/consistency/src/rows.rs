@@ -131,7 +131,8 @@ pub fn unlike_repeats(places: &[Vec<f64>]) -> Option<Rows> {
     let tail =
         |rank: usize, at: usize| (f_tail(ratio(rank, at), repeated[at].dof, behind[rank].1) * count as f64).min(1.0);
     let apart = |rank: usize| {
-        repeated[rank - 1].mean_square() > (1.0 + (rank as f64).sqrt().recip()).powi(2) * repeated[rank].mean_square()
+        // A mean square of few readings has a longer tail than a reading: half of what single readings have to be apart by.
+        repeated[rank - 1].mean_square() > (1.0 + 0.5 / (rank as f64).sqrt()).powi(2) * repeated[rank].mean_square()
     };
     let named = (1..=most).rev().find(|rank| apart(*rank) && tail(*rank, rank - 1) < NAMED).unwrap_or(0);
     let rank = named.max(1);

@@ -77,7 +77,7 @@ fn key_values(values: &[KeyValue]) -> Markup {
                 }
             }
             @if values.iter().any(|value| value.is_refuted) {
-                p.note { "! The data contradict the ±, which is widened: no limit is proven by it." }
+                p.note { "! The data contradict the ±: no limit is proven by it." }
             }
             @if values.iter().flat_map(|value| &value.numbers).any(Number::is_outside) {
                 p.note { "^ Outside its own 95 % interval: noise raises an extreme." }

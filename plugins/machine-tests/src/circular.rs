@@ -31,7 +31,6 @@ use serde::Deserialize;
 use crate::{
     paths::{Paths, mean_of, refused},
     repeated::{in_order, single},
-    runs::mean,
 };
 
 /// `[separate] plugin = "circular"`.
@@ -121,11 +120,8 @@ impl PointSeparator for Circular {
                 "the path was recorded in one direction: there is no hysteresis and no bidirectional value".into(),
             );
         }
-        // The mean radius of each turn: it drifts, or one turn is unlike the others.
-        let sides = paths.signs.iter().map(|sign| if *sign > 0 { "radius of + turn" } else { "radius of - turn" });
-        let radii: Vec<Vec<f64>> =
-            paths.turns.iter().map(|turns| turns.iter().map(|turn| mean(turn)).collect()).collect();
-        let series: Vec<(&str, &[f64])> = sides.zip(radii.iter().map(Vec::as_slice)).collect();
+        let series = low_orders(&paths);
+        let series: Vec<(&str, &[f64])> = series.iter().map(|(name, of)| (name.as_str(), of.as_slice())).collect();
         let mut checks = in_order("the turns", &series, "µm");
         checks.extend(unlike(&paths));
         let named = |(index, (symbol, value, about)): (usize, (String, f64, &'static str))| {
@@ -236,6 +232,32 @@ impl Circular {
     }
 }
 
+/// Radius, centre and lobes of each turn, in series over the turns of a direction: they drift, or one turn is unlike the others.
+fn low_orders(paths: &Paths) -> Vec<(String, Vec<f64>)> {
+    let mut fourier = Fourier::new(paths.angles);
+    let mut harmonics = vec![Complex64::ZERO; HIGHEST_OF_TURNS + 1];
+    let mut series = Vec::new();
+    for (turns, sign) in paths.turns.iter().zip(&paths.signs) {
+        let path = if *sign > 0 { '+' } else { '-' };
+        let of_turns: Vec<Vec<Complex64>> = turns
+            .iter()
+            .map(|turn| {
+                fourier.analyse(turn.iter().copied(), &mut harmonics);
+                harmonics.clone()
+            })
+            .collect();
+        let mut add = |name: String, of: &dyn Fn(&Vec<Complex64>) -> f64| {
+            series.push((format!("{name} of {path} turn"), of_turns.iter().map(of).collect()));
+        };
+        add("radius".into(), &|turn| turn[0].re);
+        for order in 1..=HIGHEST_OF_TURNS {
+            add(format!("order {order} cosine"), &|turn| turn[order].re);
+            add(format!("order {order} sine"), &|turn| turn[order].im);
+        }
+    }
+    series
+}
+
 /// Single readings that are not like those of the other turns at their angle.
 fn unlike(paths: &Paths) -> Option<Check> {
     // Between two readings there is a line, in which both of them are seen again.
@@ -252,6 +274,8 @@ fn unlike(paths: &Paths) -> Option<Check> {
     single(&places, named, "µm")
 }
 
+/// Orders of a turn that warming up changes: radius, centre, squareness and gains of the axes.
+const HIGHEST_OF_TURNS: usize = 3;
 /// Variance below which turns are copies: of rounding.
 const IDENTICAL_UM2: f64 = 1e-24;
 

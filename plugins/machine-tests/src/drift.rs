@@ -91,9 +91,9 @@ const AXES: [(&str, &str); 3] = [("x_um", "X"), ("y_um", "Y"), ("z_um", "Z")];
 const TEMPERATURE: &str = "temperature_c";
 const COLUMNS: [PointColumn; 5] = [
     PointColumn::needed("time_s", Number, "s", "time of the reading"),
-    PointColumn::optional("x_um", Number, "um", "displacement along X"),
-    PointColumn::optional("y_um", Number, "um", "displacement along Y"),
-    PointColumn::optional("z_um", Number, "um", "displacement along Z"),
+    PointColumn::optional("x_um", Number, "um", "displacement along X").measured(),
+    PointColumn::optional("y_um", Number, "um", "displacement along Y").measured(),
+    PointColumn::optional("z_um", Number, "um", "displacement along Z").measured(),
     PointColumn::optional(TEMPERATURE, Number, "degC", "temperature beside the machine, or of its spindle"),
 ];
 

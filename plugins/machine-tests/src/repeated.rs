@@ -60,14 +60,28 @@ impl<'a> Series<'a> {
         (0..self.all.len()).map(column).collect()
     }
 
+    /// From the first to the last number of a series, and 0 elsewhere.
+    fn ramp(&self, number: usize) -> Vec<f64> {
+        let steps = (self.all[number].1.len() - 1).max(1) as f64;
+        self.place.iter().map(|(own, at)| if *own == number { *at as f64 / steps } else { 0.0 }).collect()
+    }
+
+    /// What a drift is compared with, and the drift of each series.
+    fn levels(&self, what: &str) -> Vec<String> {
+        if self.all.len() == 1 {
+            return ["first", "last"].map(|end| format!("the {end} of {what}")).to_vec();
+        }
+        let of = |(name, _): &(&str, &[f64])| format!("the drift of {name}");
+        std::iter::once("no drift".to_owned()).chain(self.all.iter().map(of)).collect()
+    }
+
     fn judged(&self, what: &str, unit: &str, has_means: bool) -> Judgement {
         let means: Vec<f64> = self.all.iter().map(|(_, of)| mean(of)).collect();
         let residual: Vec<f64> = self.place.iter().map(|(own, at)| self.all[*own].1[*at] - means[*own]).collect();
-        let ramp = |(own, at): &(usize, usize)| *at as f64 / (self.all[*own].1.len() - 1).max(1) as f64;
         let drift = Shift {
             name: what.to_owned(),
-            levels: ["first", "last"].map(|end| format!("the {end} of {what}")).to_vec(),
-            columns: vec![self.place.iter().map(ramp).collect()],
+            levels: self.levels(what),
+            columns: (0..self.all.len()).map(|number| self.ramp(number)).collect(),
         };
         let mut structure = Structure::default()
             .along(

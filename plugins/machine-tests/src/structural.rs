@@ -154,7 +154,7 @@ impl StructuralMotion {
                 self.0.window_s
             ));
         } else if std(ranges) > 0.0 {
-            let judged = means_in_order("the windows", &[(&format!("{axis}: window"), ranges)], "µm");
+            let judged = means_in_order("the windows", &[("window", ranges)], "µm");
             let error = judged.factors[0] * std(ranges) / (count as f64).sqrt();
             said.checks.extend(judged.checks.into_iter().map(|check| check.within(axis)));
             let reach = student_95((count - 1) as f64) * error;

@@ -170,8 +170,10 @@ fn of_rows(axis: Axis, campaign: &Campaign, effects: &[Column]) -> Vec<Check> {
         noise: None,
         unit: "µm",
     };
+    // A row is a combination of the readings at a command.
+    let at = |command: &usize| format!("a combination of the readings at {}°", campaign.commands_deg[*command]);
     let structure = offsets.structure(&data.command, campaign.commands_deg.len(), of_offsets);
-    judge(fit, &structure).checks.into_iter().filter(|check| check.test != Test::Rows).collect()
+    judge(fit, &structure.naming(data.command.iter().map(at).collect())).checks
 }
 
 /// What the rows determine of location errors and placement, each a number.

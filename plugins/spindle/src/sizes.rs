@@ -25,6 +25,7 @@ pub(crate) fn mistaken_units(rig: &Rig, readings: &Readings) -> Vec<String> {
         orders.flat_map(|order| order.iter().skip(sensor).step_by(sensors)).map(Complex64::norm_sqr).sum::<f64>().sqrt()
     };
     let sizes: Vec<f64> = (0..sensors).map(size).collect();
+    let near = |ratio: f64| (BETWEEN_UNITS / USUAL_RATIO..BETWEEN_UNITS * USUAL_RATIO).contains(&ratio);
     let looks_along = |sensor: usize| rig.sensors[sensor].axial_radius_mm.is_some();
     let said = |sensor: usize| {
         let others = (0..sensors).filter(|other| *other != sensor && looks_along(*other) == looks_along(sensor));
@@ -35,7 +36,6 @@ pub(crate) fn mistaken_units(rig: &Rig, readings: &Readings) -> Vec<String> {
         others.sort_by(f64::total_cmp);
         let ratio = sizes[sensor] / others[others.len() / 2];
         let id = &rig.sensors[sensor].id;
-        let near = |ratio: f64| (BETWEEN_UNITS / USUAL_RATIO..BETWEEN_UNITS * USUAL_RATIO).contains(&ratio);
         if near(1.0 / ratio) {
             Some(format!(
                 "the readings of sensor `{id}` are {:.0} times smaller than those of the others: they may be in a larger unit (millimetres \
@@ -69,5 +69,28 @@ pub(crate) fn mistaken_units(rig: &Rig, readings: &Readings) -> Vec<String> {
             significant(2.0 * most_um, 2)
         )
     });
-    (0..sensors).filter_map(said).chain(beyond).chain(below).collect()
+    (0..sensors).filter_map(said).chain(beyond).chain(below).chain(unlike_setups(rig, readings, near)).collect()
+}
+
+/// A setup whose readings are a thousand times larger than those of another one, without their centring.
+fn unlike_setups(rig: &Rig, readings: &Readings, near: impl Fn(f64) -> bool) -> Option<String> {
+    let sensors = rig.sensors.len();
+    let size = |setup: usize| {
+        let orders = readings.mean.chunks_exact(readings.count).skip(2);
+        let own = orders.flat_map(|order| order.iter().skip(setup * sensors).take(sensors));
+        own.map(Complex64::norm_sqr).sum::<f64>().sqrt()
+    };
+    let sizes = || (0..readings.count / sensors.max(1)).map(|setup| (size(setup), setup));
+    let (small, smallest) = sizes().min_by(|one, other| one.0.total_cmp(&other.0))?;
+    let (large, largest) = sizes().max_by(|one, other| one.0.total_cmp(&other.0))?;
+    let id = |setup: usize| rig.setups.get(setup).map_or("", |setup| setup.id.as_str());
+    near(large / small).then(|| {
+        format!(
+            "the readings of setup `{}` are {:.0} times larger than those of setup `{}`: one of them may be in another unit (millimetres or \
+             nanometres where µm is declared): convert its file",
+            id(largest),
+            large / small,
+            id(smallest)
+        )
+    })
 }

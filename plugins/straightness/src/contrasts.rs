@@ -6,7 +6,7 @@
 
 use runout_core::{
     consistency::{Kind, Structure, order::OrderModels},
-    numerics::least_squares::{Basis, orthonormal},
+    numerics::least_squares::{Basis, norm, orthonormal},
 };
 
 use crate::{design::Design, trace::AxialTrace};
@@ -21,8 +21,10 @@ const MOST_CHANGES: usize = 40;
 /// Contrasts of the readings of a [`Design`].
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Contrasts {
-    /// Rows of contrasts, `[contrast][trace]`, orthonormal.
+    /// Rows of contrasts, `[contrast][trace]`, orthonormal; first those between the traces of one setup.
     rows: Vec<Vec<f64>>,
+    /// How many of them are of one setup.
+    within: usize,
     /// z of the places, in mm.
     z_mm: Vec<f64>,
     /// Readings of each trace at each place, `[place][trace]`.
@@ -62,7 +64,17 @@ impl Contrasts {
         let steps = ((last - first) / spacing).round().min(MOST_PLACES);
         let unit = |trace: usize| (0..traces).map(|other| f64::from(u8::from(other == trace))).collect::<Vec<f64>>();
         let free = orthonormal(design.free(), &[], 1e-9);
-        let rows = orthonormal(members().map(unit).collect(), &free, 1e-6);
+        // A trace beside the others of its setup.
+        let beside = |trace: usize| {
+            let setup = design.data.setups[trace];
+            let others: Vec<usize> = members().filter(|other| design.data.setups[*other] == setup).collect();
+            let mut row = unit(trace);
+            others.iter().for_each(|other| row[*other] -= (others.len() as f64).recip());
+            row
+        };
+        let beside: Vec<Vec<f64>> = members().map(beside).filter(|row| norm(row) > 1e-6).collect();
+        let within = orthonormal(beside.clone(), &free, 1e-6).len();
+        let rows = orthonormal(beside.into_iter().chain(members().map(unit)).collect(), &free, 1e-6);
         if rows.is_empty() || steps.is_nan() || steps < 2.0 {
             return Self { averaged: 1.0, ..Self::default() };
         }
@@ -83,7 +95,7 @@ impl Contrasts {
             .unzip();
         let readings: usize = cells.iter().flatten().map(Vec::len).sum();
         let averaged = readings as f64 / (cells.len() * members().count()).max(1) as f64;
-        Self { rows, z_mm, cells, averaged }
+        Self { rows, within, z_mm, cells, averaged }
     }
 
     /// The contrasts of what is given at each reading, one contrast after the other.
@@ -99,9 +111,16 @@ impl Contrasts {
         let places = self.z_mm.len();
         let each = || (0..self.rows.len()).flat_map(|row| (0..places).map(move |place| (row, place)));
         let names = (1..=BLOCKS).map(|block| block.to_string()).collect();
-        Structure::default()
+        let structure = Structure::default()
             .along("z", each().map(|(row, _)| row).collect(), each().map(|(_, place)| self.z_mm[place]).collect())
-            .divided("z-blocks", Kind::Blocks, each().map(|(_, place)| place * BLOCKS / places).collect(), names)
+            .divided("z-blocks", Kind::Blocks, each().map(|(_, place)| place * BLOCKS / places).collect(), names);
+        if self.within == 0 || self.within == self.rows.len() {
+            return structure;
+        }
+        // What the setups contradict each other by is as small as what the traces of one do, or the model lacks something.
+        let names = ["the difference of traces of one setup", "the difference between the setups"];
+        let level = each().map(|(row, _)| usize::from(row >= self.within)).collect();
+        structure.divided("differences", Kind::Alike, level, names.map(str::to_owned).to_vec())
     }
 
     /// Errors of one trace from models of those of its contrasts, which are of one covariance.

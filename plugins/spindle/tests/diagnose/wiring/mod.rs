@@ -375,3 +375,21 @@ fn a_channel_in_another_unit_is_named() {
     assert!(warnings.iter().any(named), "{warnings:?}");
     assert!(!warnings.iter().any(|warning| warning.contains("a mistake is likely")), "{warnings:?}");
 }
+
+/// So is a setup in millimetres beside one in µm, however it is centred.
+#[test]
+fn a_setup_in_another_unit_is_named() {
+    let all = r#"[{"plugin":"sensor-gain","targets":["S1","S2","S3","S4"],"relative_gain":-0.999}]"#;
+    let of = |effect: &str| {
+        let mut config = reversed(3, effect);
+        config.eccentricity.offset_um = 40.0;
+        let rig = config.rig.clone().check().unwrap();
+        (config.rig.clone(), averaged(&config, &rig).0)
+    };
+    let ((rig, mut mixed), (_, in_mm)) = (of("[]"), of(all));
+    mixed.profiles[1] = in_mm.profiles[1].clone();
+    let warnings = warned(&rig, &mixed);
+    assert!(warnings.iter().any(|warning| warning.contains("may be in another unit")), "{warnings:?}");
+    let sound = warned(&rig, &of("[]").1);
+    assert!(!sound.iter().any(|warning| warning.contains("another unit")), "{sound:?}");
+}
