@@ -120,9 +120,7 @@ impl PointSeparator for Circular {
                 "the path was recorded in one direction: there is no hysteresis and no bidirectional value".into(),
             );
         }
-        let series = low_orders(&paths);
-        let series: Vec<(&str, &[f64])> = series.iter().map(|(name, of)| (name.as_str(), of.as_slice())).collect();
-        let mut checks = in_order("the turns", &series, "µm");
+        let mut checks = low_orders(&paths);
         checks.extend(unlike(&paths));
         let named = |(index, (symbol, value, about)): (usize, (String, f64, &'static str))| {
             let known = known.get(index).and_then(|known| known.at(value));
@@ -232,30 +230,38 @@ impl Circular {
     }
 }
 
-/// Radius, centre and lobes of each turn, in series over the turns of a direction: they drift, or one turn is unlike the others.
-fn low_orders(paths: &Paths) -> Vec<(String, Vec<f64>)> {
+/// Radius, centre and lobes of each turn over the turns of its direction, order by order: they drift, or one turn is unlike the others.
+fn low_orders(paths: &Paths) -> Vec<Check> {
     let mut fourier = Fourier::new(paths.angles);
     let mut harmonics = vec![Complex64::ZERO; HIGHEST_OF_TURNS + 1];
-    let mut series = Vec::new();
-    for (turns, sign) in paths.turns.iter().zip(&paths.signs) {
-        let path = if *sign > 0 { '+' } else { '-' };
-        let of_turns: Vec<Vec<Complex64>> = turns
-            .iter()
-            .map(|turn| {
-                fourier.analyse(turn.iter().copied(), &mut harmonics);
-                harmonics.clone()
-            })
-            .collect();
-        let mut add = |name: String, of: &dyn Fn(&Vec<Complex64>) -> f64| {
-            series.push((format!("{name} of {path} turn"), of_turns.iter().map(of).collect()));
-        };
-        add("radius".into(), &|turn| turn[0].re);
-        for order in 1..=HIGHEST_OF_TURNS {
-            add(format!("order {order} cosine"), &|turn| turn[order].re);
-            add(format!("order {order} sine"), &|turn| turn[order].im);
+    let mut of_turn = |turn: &Vec<f64>| {
+        fourier.analyse(turn.iter().copied(), &mut harmonics);
+        harmonics.clone()
+    };
+    let found: Vec<Vec<Vec<Complex64>>> =
+        paths.turns.iter().map(|turns| turns.iter().map(&mut of_turn).collect()).collect();
+    let mut checks = Vec::new();
+    for order in 0..=HIGHEST_OF_TURNS {
+        let mut series: Vec<(String, Vec<f64>)> = Vec::new();
+        for (turns, sign) in found.iter().zip(&paths.signs) {
+            let path = if *sign > 0 { '+' } else { '-' };
+            let mut add = |name: &str, of: fn(&Complex64) -> f64| {
+                series.push((format!("{name} of {path} turn"), turns.iter().map(|turn| of(&turn[order])).collect()));
+            };
+            if order == 0 {
+                add("radius", |one| one.re);
+            } else {
+                add(&format!("order {order} cosine"), |one| one.re);
+                add(&format!("order {order} sine"), |one| one.im);
+            }
+        }
+        let series: Vec<(&str, &[f64])> = series.iter().map(|(name, of)| (name.as_str(), of.as_slice())).collect();
+        if order == 0 || series.iter().all(|(_, of)| of.len() >= FEWEST_TURNS) {
+            let found = in_order("the turns", &series, "µm").into_iter();
+            checks.extend(found.map(|check| check.among(PARTS_OF_TURNS)));
         }
     }
-    series
+    checks
 }
 
 /// Single readings that are not like those of the other turns at their angle.
@@ -276,6 +282,10 @@ fn unlike(paths: &Paths) -> Option<Check> {
 
 /// Orders of a turn that warming up changes: radius, centre, squareness and gains of the axes.
 const HIGHEST_OF_TURNS: usize = 3;
+/// Turns of a direction from which on more than their radius is judged.
+const FEWEST_TURNS: usize = 4;
+/// Orders, and series of each that may be one motion: so many parts may differ by chance.
+const PARTS_OF_TURNS: usize = 4 * (HIGHEST_OF_TURNS + 1);
 /// Variance below which turns are copies: of rounding.
 const IDENTICAL_UM2: f64 = 1e-24;
 
