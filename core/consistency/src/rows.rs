@@ -114,10 +114,11 @@ pub fn unlike_repeats(places: &[Vec<f64>]) -> Option<Rows> {
     }
     let (squares, dof) =
         (repeated.iter().map(|one| one.squares).sum::<f64>(), repeated.iter().map(|one| one.dof).sum::<f64>());
-    if dof < FEWEST as f64 || squares <= 0.0 {
+    let count = repeated.len();
+    // One place has no others.
+    if count < 2 || dof < FEWEST as f64 || squares <= 0.0 {
         return None;
     }
-    let count = repeated.len();
     repeated.sort_by(|one, other| other.mean_square().total_cmp(&one.mean_square()));
     let most = ((MOST * count as f64).ceil() as usize).clamp(1, MOST_SUSPECTS).min(count - 1);
     // Noise and degrees of freedom behind each rank, from none left out to all suspects.
@@ -337,6 +338,8 @@ mod tests {
             assert!(counts.len() < 100 || three > 190, "{} places: {three}", counts.len());
         }
         assert!(unlike_repeats(&[vec![1.0, 2.0], vec![3.0]]).is_none());
+        let one_place: Vec<f64> = (0..12).map(f64::from).collect();
+        assert!(unlike_repeats(&[one_place, vec![3.0]]).is_none() && unlike_repeats(&[]).is_none());
     }
 
     #[test]
