@@ -33,5 +33,4 @@ class External:
     them."""
 
     timeout_s: Union[float, None] = None
-    """Longest time for one answer, of one table of one station, in s; the first one includes the start of the program. Default:
-    60.0."""
+    """Longest time for one answer, in s; the first one includes the start of the program. Default: 60.0."""

@@ -58,12 +58,14 @@ class External:
     memory_mb: Union[int, None] = None
     """Most memory that the program may write to, in MB, on Linux; without it, as much as there is."""
 
+    output_mb: Union[int, None] = None
+    """Largest answer, in MB. Default: 64."""
+
     path: str
     """Folder of the files, relative to the TOML. Made where it is missing."""
 
     timeout_s: Union[float, None] = None
-    """Longest time for one answer, of one table of one station, in s; the first one includes the start of the program. Default:
-    60.0."""
+    """Longest time for one answer, in s; the first one includes the start of the program. Default: 60.0."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

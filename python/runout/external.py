@@ -1,4 +1,4 @@
-"""Separators, effects, evaluators, loaders of points and exporters as programs: `serve(MySeparator())` makes one of a class.
+"""Separators, preprocessors, effects, evaluators, loaders and exporters as programs: `serve(MySeparator())` makes one of a class.
 
     class Mine:
         def separate(self, station):
@@ -57,6 +57,30 @@ class Station:
     """Texts appended here become warnings of the result."""
 
 
+@dataclasses.dataclass
+class Average:
+    """The average over the turns of one capture: readings are Re Σ c exp(−i·n·Φ), µm."""
+
+    capture: str
+    """Where it is from, for messages."""
+    setup: str
+    turns: int
+    """Turns averaged."""
+    speed_rpm: float | None
+    sample_rate_hz: float | None
+    rig: dict[str, Any]
+    """`part_radius_mm`, `rotation`, `sensors` and `setups`."""
+    config: dict[str, Any]
+    """The keys of `config` in the pipeline."""
+    sensors: list[str]
+    orders: npt.NDArray[np.int64]
+    """From 0."""
+    readings: npt.NDArray[np.complex128]
+    """`[order, sensor]`."""
+    warnings: list[str] = dataclasses.field(default_factory=list)
+    """Texts appended here become warnings of the result."""
+
+
 @dataclasses.dataclass(frozen=True)
 class Value:
     """A value; `std` is None where no uncertainty is known."""
@@ -87,6 +111,14 @@ class TurnSeparator(Protocol):
     def separate(self, station: Station) -> Harmonics | tuple[Harmonics, Harmonics]:
         """An array over `station.orders` of each quantity, NaN where an order is lost; and the same of standard deviations √E|δ|², where they
         are known."""
+
+
+class Preprocessor(Protocol):
+    """A change of averages, behind `synchronous-average`."""
+
+    def preprocess(self, average: Average) -> npt.ArrayLike | tuple[npt.ArrayLike, npt.ArrayLike]:
+        """The readings as they are taken from now on, `[order, sensor]`, all of them finite; and by what errors of each are multiplied, where that is
+        not 1: a factor that a reading is multiplied by belongs here, what is subtracted does not."""
 
 
 class PointSeparator(Protocol):
@@ -154,11 +186,12 @@ class Exporter(Protocol):
         """Writes each of `files` (name and path to write to); `summary` is that of `summary.json`."""
 
 
-Served = Union[TurnSeparator, PointSeparator, Effect, Evaluator, Loader, Recordings, Exporter]
+Served = Union[TurnSeparator, Preprocessor, PointSeparator, Effect, Evaluator, Loader, Recordings, Exporter]
 
 _METHODS = {
     "separate-turns": "separate",
     "separate-points": "values",
+    "preprocess": "preprocess",
     "transfer": "transfer",
     "evaluate": "evaluate",
     "load-points": "load",
@@ -244,6 +277,26 @@ class Answering:
             left = np.asarray(left, float)
             frames.append(_frame("residual", pa.table({"row": np.arange(len(left)), "residual_um": pa.array(left, mask=np.isnan(left))})))
         return frames
+
+    def _preprocess(self, tables: dict[str, pa.Table], config: dict[str, Any]) -> list[bytes]:
+        given, about = tables["profile"], json.loads(self._about["capture"])
+        orders = int(given["order"].to_numpy().max()) + 1
+        sensors = given["sensor"][: len(given) // orders].to_pylist()
+        readings = _complex(given).reshape(orders, len(sensors))
+        average = Average(
+            **about, rig=json.loads(self._about["rig"]), config=config, sensors=sensors, orders=np.arange(orders), readings=readings
+        )
+        found = self._plugin.preprocess(average)
+        new, gain = found if isinstance(found, tuple) else (found, None)
+        columns = {"sensor": given["sensor"], "order": given["order"]}
+        for prefix, array in (("", new), ("gain_", gain)):
+            if array is None:
+                continue
+            array = np.asarray(array, np.complex128)
+            if array.shape != readings.shape:
+                raise ValueError(f"preprocess: expected the shape {readings.shape}, [order, sensor], found {array.shape}")
+            columns |= {f"{prefix}re": array.real.ravel(), f"{prefix}im": array.imag.ravel()}
+        return [_frame("profile", pa.table(columns)), *(_text("warning", text) for text in average.warnings)]
 
     def _transfer(self, tables: dict[str, pa.Table], _: dict[str, Any]) -> list[bytes]:
         orders = tables["orders"]["order"].to_numpy().astype(np.int64)

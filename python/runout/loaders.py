@@ -221,4 +221,4 @@ class External:
     """The file that the program reads, relative to the TOML. Its checksum belongs to the result."""
 
     timeout_s: Union[float, None] = None
-    """Longest time for the answer, in s. Default: 60.0."""
+    """Longest time for one answer, in s; the first one includes the start of the program. Default: 60.0."""

@@ -3,7 +3,7 @@
     runout.run("pipeline.toml", plugins=[HalfTheSum()], set={"separate": {"plugin": "half-the-sum"}})
 
 One of its methods says what an object is: `operator` a separator that is a linear formula, `transfer` an effect; `separate` and `values` separators of
-turns and of points, `captures` a loader of recorded turns, `evaluate`, `load` and `export` what they say (`runout.external` has their types). `name` is what pipelines call it, in
+turns and of points, `preprocess` a preprocessor of averages, `captures` a loader of recorded turns, `evaluate`, `load` and `export` what they say (`runout.external` has their types). `name` is what pipelines call it, in
 kebab-case; of other objects than formulas and effects it is that of the class without it. The first line of the docstring of its class says what it
 does.
 """
@@ -66,11 +66,11 @@ class Effect(Protocol):
         """
 
 
-METHODS = ("operator", "transfer", "separate", "values", "load", "captures", "evaluate", "export")
+METHODS = ("operator", "transfer", "preprocess", "separate", "values", "load", "captures", "evaluate", "export")
 """The method that says what an object is."""
 _SEPARATORS = ("operator", "separate", "values")
 _EXPECTED = (
-    "an object with the method `operator`, `separate` or `values` (a separator), `transfer` (an effect), `evaluate`, `load`, `captures` or `export`"
+    "an object with the method `operator`, `separate` or `values` (a separator), `transfer` (an effect), `preprocess`, `evaluate`, `load`, `captures` or `export`"
 )
 
 
@@ -167,7 +167,7 @@ def named(keys: Mapping[str, Any]) -> tuple[dict[str, Any], list[Any]]:
     for key in ("load", "separate"):
         if key in changed:
             changed[key] = by_name(changed[key])
-    for key in ("compare", "evaluator", "export"):
+    for key in ("preprocess", "compare", "evaluator", "export"):
         if isinstance(changed.get(key), (list, tuple)):
             changed[key] = [by_name(stage) for stage in changed[key]]
     return changed, found

@@ -63,3 +63,25 @@ class SynchronousAverage:
 
     turn_tolerance_percent: Union[float, None] = None
     """Turns whose length is off the capture's median by more are left out, in percent, below 50. Default: 5.0."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class External:
+    """A change of averages, harmonic by harmonic, by a program in any language"""
+
+    plugin: ClassVar[str] = "external"
+
+    command: Sequence[str]
+    """The program and its arguments. It runs in the folder of the pipeline; a program whose name has a `/` is a path from there."""
+
+    config: Union[Mapping[str, Any], None] = None
+    """What the program gets as `runout.config`: keys of its own."""
+
+    memory_mb: Union[int, None] = None
+    """Most memory that the program may write to, in MB, on Linux; without it, as much as there is."""
+
+    output_mb: Union[int, None] = None
+    """Largest answer, in MB. Default: 64."""
+
+    timeout_s: Union[float, None] = None
+    """Longest time for one answer, in s; the first one includes the start of the program. Default: 60.0."""

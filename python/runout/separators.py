@@ -537,5 +537,4 @@ class External:
     """Values that it gives of measured points, and no others: those that `[[limit]]` may name."""
 
     timeout_s: Union[float, None] = None
-    """Longest time for one answer, of a station or of all points, in s; the first one includes the start of the program. Default:
-    60.0."""
+    """Longest time for one answer, in s; the first one includes the start of the program. Default: 60.0."""

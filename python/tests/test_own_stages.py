@@ -78,6 +78,43 @@ def test_a_separator_of_turns_gives_what_the_program_of_its_class_gives(folder: 
     assert plugin.name in str(comparison["methods"]) and "three-point" in str(comparison["methods"])
 
 
+GAIN = '''
+import numpy as np
+
+class Gain:
+    """Divides the first sensor by its gain."""
+
+    def preprocess(self, average):
+        gain = np.ones(average.readings.shape)
+        gain[:, average.sensors.index(average.config["sensor"])] /= average.config["gain"]
+        average.warnings.append(f"{average.setup}: {average.turns} turns")
+        return gain * average.readings, gain
+
+plugin = Gain()
+'''
+
+
+def test_a_preprocessor_gives_what_the_program_of_its_class_gives(folder: Path) -> None:
+    (folder / "gain_class.py").write_text(GAIN)
+    plugin, command = module(folder / "gain_class.py").plugin, served(folder, GAIN)
+    config = {"sensor": "S2", "gain": 1.25}
+
+    def ran(*preprocess: dict[str, Any], **gain: float) -> runout.Result:
+        stages = small_pipeline()
+        sensors = [sensor | (gain if sensor["id"] == "S2" else {}) for sensor in stages["rig"]["sensors"]]
+        stages = stages | {"rig": stages["rig"] | {"sensors": sensors}, "preprocess": [*stages["preprocess"], *preprocess]}
+        return runout.run(stages, small_recording())
+
+    program = ran({"plugin": "external", "command": command, "config": config})
+    own = ran({"plugin": plugin, "config": config})
+    same(own, program)
+    assert any("initial: " in text for text in own.summary["warnings"])
+    # What the rig says of the gain does the same.
+    found, expected = (pa.table(result.tables["harmonics"]) for result in (own, ran(gain=1.25)))
+    for name in ("re", "im", "std"):
+        assert np.allclose(found[name].to_numpy(), expected[name].to_numpy(), rtol=1e-6, atol=1e-9, equal_nan=True), name
+
+
 SPHERE = '''
 import numpy as np
 from runout.external import Value

@@ -145,7 +145,7 @@ pub fn station_with_spread(
 fn trim(end_turns: usize) -> Result<Box<dyn Conditioner>> {
     match (TrimConfig { speed_tolerance_percent: 1.0, start_turns: 0, end_turns }).check(&no_context()) {
         Ok(Preprocessor::Conditioner(conditioner)) => Ok(conditioner),
-        Ok(Preprocessor::Averager(_)) => Err(Error::new("set up", "the trim", "it is no conditioner")),
+        Ok(_) => Err(Error::new("set up", "the trim", "it is no conditioner")),
         Err(fault) => Err(Error::caused("set up", "the trim", fault)),
     }
 }
@@ -160,7 +160,7 @@ fn averager(samples_per_rev: usize) -> Result<Box<dyn Averager>> {
     };
     match config.check(&no_context()) {
         Ok(Preprocessor::Averager(averager)) => Ok(averager),
-        Ok(Preprocessor::Conditioner(_)) => Err(Error::new("set up", "the average", "it is no averager")),
+        Ok(_) => Err(Error::new("set up", "the average", "it is no averager")),
         Err(fault) => Err(Error::caused("set up", "the average", fault)),
     }
 }

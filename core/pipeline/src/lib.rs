@@ -39,5 +39,6 @@ pub use runout_standards as standards;
 pub use runout_table as table;
 pub use runout_turning::{
     azimuth, checksum, clock, counted_turns, creep, encoder, input_file, inspection, level_step, mains, marker,
-    measurement, near_tone, neighbours, profile, provenance, reading, rig, separation, spread, station, surface,
+    measurement, near_tone, neighbours, profile, profile_change, provenance, reading, rig, separation, spread, station,
+    surface,
 };

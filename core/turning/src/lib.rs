@@ -37,6 +37,7 @@ pub mod measurement;
 pub mod near_tone;
 pub mod neighbours;
 pub mod profile;
+pub mod profile_change;
 pub mod provenance;
 pub mod reading;
 mod residual;

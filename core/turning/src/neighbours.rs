@@ -52,6 +52,13 @@ impl Neighbours {
         covariance
     }
 
+    /// Multiplies each order and channel, `[order][channel]`, on both sides.
+    pub(crate) fn multiply(&mut self, gain: &[Complex64]) {
+        self.coefficients
+            .iter_mut()
+            .for_each(|side| side.iter_mut().zip(gain).for_each(|(value, gain)| *value *= gain));
+    }
+
     /// Takes a known signal out of a channel: `of` gives, for each [`Beside`], the mean of the signal times e^{iνθ} over the record as a
     /// function of ν, θ counted from each turn's start. Nothing happens to a channel that is not there.
     pub fn take_out<At: Fn(f64) -> Complex64>(&mut self, channel: usize, of: impl Fn(Beside) -> At) {

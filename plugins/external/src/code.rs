@@ -30,6 +30,8 @@ pub enum CodeKind {
         /// Values that limits may name; nothing else is given where there are some.
         symbols: Vec<Symbol>,
     },
+    /// It changes averages.
+    Preprocessor,
     /// It loads points or recorded turns.
     Loader(Gives),
     /// It computes these values, at least one.
@@ -84,6 +86,11 @@ pub fn register_code(
             registry.separators.add(Plugin::made(name, about, move |keys: Keys, _: &Context| {
                 let keys = Value::Object(keys.config);
                 config::points(Arc::clone(&code).into(), keys, &columns, &labels, &symbols).map_err(of_object)
+            }));
+        }
+        CodeKind::Preprocessor => {
+            registry.preprocessors.add(Plugin::made(name, about, move |keys: Keys, context: &Context| {
+                config::corrector(Arc::clone(&code).into(), Value::Object(keys.config), context)
             }));
         }
         CodeKind::Loader(gives) => {

@@ -5,53 +5,24 @@ use std::path::{Component, Path, PathBuf};
 use runout_core::{
     fault::Fault,
     pipeline::{Context, StageConfig},
-    stage::{Evaluator, Exporter, Loader, Separator, require_rig},
+    stage::{Evaluator, Exporter, Loader, Preprocessor, Separator, require_rig},
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
-use serde_json::{Map, Value};
+use serde_json::Value;
 
 use crate::{
+    corrector::ExternalCorrector,
     evaluator::ExternalEvaluator,
     exporter::ExternalExporter,
     loader::ExternalLoader,
     points::ExternalPointSeparator,
-    program::Program,
     recording::ExternalRecordings,
     responder::Responder,
     session::Session,
     turns::TurnSeparator,
     values::{Symbol, declared},
 };
-
-/// `[separate] plugin = "external"`.
-#[derive(Debug, Clone, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct ExternalSeparatorConfig {
-    /// The program and its arguments. It runs in the folder of the pipeline; a program whose name has a `/` is a path from there.
-    pub command: Vec<String>,
-    /// Columns of numbers that the program takes of measured points; without it, it takes the turns of a rig.
-    #[serde(default)]
-    pub columns: Option<Vec<String>>,
-    /// Columns of texts that it takes of measured points.
-    #[serde(default)]
-    pub labels: Vec<String>,
-    /// Values that it gives of measured points, and no others: those that `[[limit]]` may name.
-    #[serde(default)]
-    pub symbols: Vec<Symbol>,
-    /// What the program gets as `runout.config`: keys of its own.
-    #[serde(default)]
-    pub config: Map<String, Value>,
-    /// Longest time for one answer, of a station or of all points, in s; the first one includes the start of the program.
-    #[serde(default = "default_timeout_s")]
-    pub timeout_s: f64,
-    /// Most memory that the program may write to, in MB, on Linux; without it, as much as there is.
-    #[serde(default)]
-    pub memory_mb: Option<u64>,
-    /// Largest answer, in MB.
-    #[serde(default = "default_output_mb")]
-    pub output_mb: u64,
-}
 
 pub(crate) fn default_timeout_s() -> f64 {
     60.0
@@ -61,6 +32,55 @@ pub(crate) fn default_output_mb() -> u64 {
     64
 }
 
+/// The keys of a stage that is a program: its own, and those that every program has.
+macro_rules! with_program {
+    ($(#[$about:meta])* pub struct $name:ident { $($(#[$key:meta])* pub $field:ident: $of:ty,)* }) => {
+        $(#[$about])*
+        #[derive(Debug, Clone, serde::Deserialize, schemars::JsonSchema)]
+        #[serde(deny_unknown_fields)]
+        pub struct $name {
+            /// The program and its arguments. It runs in the folder of the pipeline; a program whose name has a `/` is a path from there.
+            pub command: Vec<String>,
+            $($(#[$key])* pub $field: $of,)*
+            /// What the program gets as `runout.config`: keys of its own.
+            #[serde(default)]
+            pub config: serde_json::Map<String, serde_json::Value>,
+            /// Longest time for one answer, in s; the first one includes the start of the program.
+            #[serde(default = "crate::config::default_timeout_s")]
+            pub timeout_s: f64,
+            /// Most memory that the program may write to, in MB, on Linux; without it, as much as there is.
+            #[serde(default)]
+            pub memory_mb: Option<u64>,
+            /// Largest answer, in MB.
+            #[serde(default = "crate::config::default_output_mb")]
+            pub output_mb: u64,
+        }
+
+        impl $name {
+            fn program(&self, context: &runout_core::pipeline::Context) -> std::result::Result<$crate::program::Program, runout_core::fault::Fault> {
+                let limits = (self.timeout_s, self.memory_mb, self.output_mb);
+                $crate::program::Program::new(self.command.clone(), context.folder, limits)
+            }
+        }
+    };
+}
+pub(crate) use with_program;
+
+with_program! {
+    /// `[separate] plugin = "external"`.
+    pub struct ExternalSeparatorConfig {
+        /// Columns of numbers that the program takes of measured points; without it, it takes the turns of a rig.
+        #[serde(default)]
+        pub columns: Option<Vec<String>>,
+        /// Columns of texts that it takes of measured points.
+        #[serde(default)]
+        pub labels: Vec<String>,
+        /// Values that it gives of measured points, and no others: those that `[[limit]]` may name.
+        #[serde(default)]
+        pub symbols: Vec<Symbol>,
+    }
+}
+
 impl StageConfig for ExternalSeparatorConfig {
     type Stage = Separator;
 
@@ -68,7 +88,7 @@ impl StageConfig for ExternalSeparatorConfig {
     const ABOUT: &'static str = "a program in any language: tables on stdin and stdout";
 
     fn check(self, context: &Context) -> Result<Separator, Fault> {
-        let program = Program::new(self.command, context.folder, self.timeout_s, self.memory_mb, self.output_mb)?;
+        let program = self.program(context)?;
         let (responder, config) = (Responder::from(program), Value::Object(self.config));
         match &self.columns {
             Some(columns) => points(responder, config, columns, &self.labels, &self.symbols),
@@ -156,29 +176,15 @@ pub(crate) fn exporter(
     Ok(Box::new(ExternalExporter { responder, config, folder: context.path(folder), files }))
 }
 
-/// `[load] plugin = "external"`.
-#[derive(Debug, Clone, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct ExternalLoaderConfig {
-    /// The program and its arguments. It runs in the folder of the pipeline; a program whose name has a `/` is a path from there.
-    pub command: Vec<String>,
-    /// The file that the program reads, relative to the TOML. Its checksum belongs to the result.
-    pub path: PathBuf,
-    /// What it gives.
-    #[serde(default)]
-    pub gives: Gives,
-    /// What the program gets as `runout.config`: keys of its own.
-    #[serde(default)]
-    pub config: Map<String, Value>,
-    /// Longest time for the answer, in s.
-    #[serde(default = "default_timeout_s")]
-    pub timeout_s: f64,
-    /// Most memory that the program may write to, in MB, on Linux; without it, as much as there is.
-    #[serde(default)]
-    pub memory_mb: Option<u64>,
-    /// Largest answer, in MB.
-    #[serde(default = "default_output_mb")]
-    pub output_mb: u64,
+with_program! {
+    /// `[load] plugin = "external"`.
+    pub struct ExternalLoaderConfig {
+        /// The file that the program reads, relative to the TOML. Its checksum belongs to the result.
+        pub path: PathBuf,
+        /// What it gives.
+        #[serde(default)]
+        pub gives: Gives,
+    }
 }
 
 /// What a loader gives.
@@ -199,31 +205,42 @@ impl StageConfig for ExternalLoaderConfig {
     const ABOUT: &'static str = "measured points or recorded turns by a program in any language";
 
     fn check(self, context: &Context) -> Result<Self::Stage, Fault> {
-        let program = Program::new(self.command, context.folder, self.timeout_s, self.memory_mb, self.output_mb)?;
+        let program = self.program(context)?;
         loader(program.into(), Value::Object(self.config), &self.path, self.gives, context)
     }
 }
 
-/// `[[evaluator]] plugin = "external"`.
-#[derive(Debug, Clone, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct ExternalEvaluatorConfig {
-    /// The program and its arguments. It runs in the folder of the pipeline; a program whose name has a `/` is a path from there.
-    pub command: Vec<String>,
-    /// Values that it gives, at least one, and no others: `symbols = [{ symbol = "lobing", unit = "um" }]`. `[[limit]]` may name them.
-    pub symbols: Vec<Symbol>,
-    /// What the program gets as `runout.config`: keys of its own.
-    #[serde(default)]
-    pub config: Map<String, Value>,
-    /// Longest time for one answer, of one table of one station, in s; the first one includes the start of the program.
-    #[serde(default = "default_timeout_s")]
-    pub timeout_s: f64,
-    /// Most memory that the program may write to, in MB, on Linux; without it, as much as there is.
-    #[serde(default)]
-    pub memory_mb: Option<u64>,
-    /// Largest answer, in MB.
-    #[serde(default = "default_output_mb")]
-    pub output_mb: u64,
+with_program! {
+    /// `[[preprocess]] plugin = "external"`.
+    pub struct ExternalPreprocessorConfig {}
+}
+
+impl StageConfig for ExternalPreprocessorConfig {
+    type Stage = Preprocessor;
+
+    const NAME: &'static str = "external";
+    const ABOUT: &'static str = "a change of averages, harmonic by harmonic, by a program in any language";
+
+    fn check(self, context: &Context) -> Result<Preprocessor, Fault> {
+        corrector(self.program(context)?.into(), Value::Object(self.config), context)
+    }
+}
+
+/// A preprocessor of averages.
+///
+/// # Errors
+/// When there is no rig.
+pub(crate) fn corrector(responder: Responder, config: Value, context: &Context) -> Result<Preprocessor, Fault> {
+    let rig = require_rig(context.rig)?.clone();
+    Ok(Preprocessor::Corrector(Box::new(ExternalCorrector { session: Session::new(responder), config, rig })))
+}
+
+with_program! {
+    /// `[[evaluator]] plugin = "external"`.
+    pub struct ExternalEvaluatorConfig {
+        /// Values that it gives, at least one, and no others: `symbols = [{ symbol = "lobing", unit = "um" }]`. `[[limit]]` may name them.
+        pub symbols: Vec<Symbol>,
+    }
 }
 
 impl StageConfig for ExternalEvaluatorConfig {
@@ -233,7 +250,7 @@ impl StageConfig for ExternalEvaluatorConfig {
     const ABOUT: &'static str = "values of a result by a program in any language";
 
     fn check(self, context: &Context) -> Result<Self::Stage, Fault> {
-        let program = Program::new(self.command, context.folder, self.timeout_s, self.memory_mb, self.output_mb)?;
+        let program = self.program(context)?;
         evaluator(program.into(), Value::Object(self.config), &self.symbols)
     }
 }
@@ -250,25 +267,14 @@ pub(crate) fn evaluator(responder: Responder, config: Value, symbols: &[Symbol])
     Ok(Box::new(ExternalEvaluator { responder, config, symbols: declared(symbols)? }))
 }
 
-/// `[[export]] plugin = "external"`.
-#[derive(Debug, Clone, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct ExternalExporterConfig {
-    /// The program and its arguments. It runs in the folder of the pipeline; a program whose name has a `/` is a path from there.
-    pub command: Vec<String>,
-    /// Folder of the files, relative to the TOML. Made where it is missing.
-    pub path: PathBuf,
-    /// Names of the files that the program writes, at least one: `files = ["values.txt"]`.
-    pub files: Vec<String>,
-    /// What the program gets as `runout.config`: keys of its own.
-    #[serde(default)]
-    pub config: Map<String, Value>,
-    /// Longest time for one answer, of one table of one station, in s; the first one includes the start of the program.
-    #[serde(default = "default_timeout_s")]
-    pub timeout_s: f64,
-    /// Most memory that the program may write to, in MB, on Linux; without it, as much as there is.
-    #[serde(default)]
-    pub memory_mb: Option<u64>,
+with_program! {
+    /// `[[export]] plugin = "external"`.
+    pub struct ExternalExporterConfig {
+        /// Folder of the files, relative to the TOML. Made where it is missing.
+        pub path: PathBuf,
+        /// Names of the files that the program writes, at least one: `files = ["values.txt"]`.
+        pub files: Vec<String>,
+    }
 }
 
 impl StageConfig for ExternalExporterConfig {
@@ -278,8 +284,7 @@ impl StageConfig for ExternalExporterConfig {
     const ABOUT: &'static str = "files of any format by a program in any language";
 
     fn check(self, context: &Context) -> Result<Self::Stage, Fault> {
-        // An answer is no more than its end and warnings.
-        let program = Program::new(self.command, context.folder, self.timeout_s, self.memory_mb, 1)?;
+        let program = self.program(context)?;
         exporter(program.into(), Value::Object(self.config), &self.path, self.files, context)
     }
 }

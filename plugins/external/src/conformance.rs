@@ -127,7 +127,7 @@ impl Conformance {
     }
 
     fn session(&self, folder: &Path) -> std::result::Result<Session, Fault> {
-        Ok(Session::new(Program::new(self.command.clone(), folder, self.timeout_s, None, 64)?))
+        Ok(Session::new(Program::new(self.command.clone(), folder, (self.timeout_s, None, 64))?))
     }
 
     fn begin(&self, folder: &Path, rig: &Rig) -> std::result::Result<TurnSeparator, Fault> {

@@ -17,9 +17,8 @@ use serde_json::{Map, Value};
 
 use crate::{
     answer::Answer,
-    config::{default_output_mb, default_timeout_s},
+    config::with_program,
     frame::Frame,
-    program::Program,
     session::Session,
     tables::{Table, encode},
     values::lasting,
@@ -29,31 +28,17 @@ const COLUMNS: [&str; 3] = ["order", "re", "im"];
 /// How far from 1 a transfer may be where all values are 0.
 const NEUTRAL: f64 = 1e-9;
 
-/// `[[effect]] plugin = "external"`.
-#[derive(Debug, Clone, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct ExternalEffectConfig {
-    /// What `[diagnose] effects` and a diagnosis call it: words with `-` between them.
-    pub id: String,
-    /// What it is, in one line.
-    #[serde(default)]
-    pub about: Option<String>,
-    /// The program and its arguments. It runs in the folder of the pipeline; a program whose name has a `/` is a path from there.
-    pub command: Vec<String>,
-    /// Its parameters, at least one: where all are 0, it changes nothing.
-    pub parameters: Vec<EffectParameter>,
-    /// What the program gets as `runout.config`: keys of its own.
-    #[serde(default)]
-    pub config: Map<String, Value>,
-    /// Longest time for one answer, in s; the first one includes the start of the program.
-    #[serde(default = "default_timeout_s")]
-    pub timeout_s: f64,
-    /// Most memory that the program may write to, in MB, on Linux; without it, as much as there is.
-    #[serde(default)]
-    pub memory_mb: Option<u64>,
-    /// Largest answer, in MB.
-    #[serde(default = "default_output_mb")]
-    pub output_mb: u64,
+with_program! {
+    /// `[[effect]] plugin = "external"`.
+    pub struct ExternalEffectConfig {
+        /// What `[diagnose] effects` and a diagnosis call it: words with `-` between them.
+        pub id: String,
+        /// What it is, in one line.
+        #[serde(default)]
+        pub about: Option<String>,
+        /// Its parameters, at least one: where all are 0, it changes nothing.
+        pub parameters: Vec<EffectParameter>,
+    }
 }
 
 /// A parameter of an effect.
@@ -98,7 +83,7 @@ impl StageConfig for ExternalEffectConfig {
                 return Err(place(Fault::at("usual", format!("expected a number above 0, found {}", one.usual))));
             }
         }
-        let program = Program::new(self.command, context.folder, self.timeout_s, self.memory_mb, self.output_mb)?;
+        let program = self.program(context)?;
         let transfer = ExternalTransfer {
             session: Session::new(program),
             config: Value::Object(self.config),

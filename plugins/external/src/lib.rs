@@ -7,6 +7,7 @@ mod answer;
 mod code;
 mod config;
 mod conformance;
+mod corrector;
 mod effect;
 mod evaluator;
 mod exporter;
@@ -25,7 +26,8 @@ mod values;
 
 pub use code::{CodeKind, register_code};
 pub use config::{
-    ExternalEvaluatorConfig, ExternalExporterConfig, ExternalLoaderConfig, ExternalSeparatorConfig, Gives,
+    ExternalEvaluatorConfig, ExternalExporterConfig, ExternalLoaderConfig, ExternalPreprocessorConfig,
+    ExternalSeparatorConfig, Gives,
 };
 pub use conformance::{Check, CheckResult, Conformance};
 pub use effect::{EffectParameter, ExternalEffectConfig};
@@ -38,6 +40,7 @@ use runout_core::pipeline::{Plugin, Registry};
 /// Adds what this crate has.
 pub fn register(registry: &mut Registry) {
     registry.loaders.add(Plugin::of::<ExternalLoaderConfig>());
+    registry.preprocessors.add(Plugin::of::<ExternalPreprocessorConfig>());
     registry.separators.add(Plugin::of::<ExternalSeparatorConfig>());
     registry.evaluators.add(Plugin::of::<ExternalEvaluatorConfig>());
     registry.exporters.add(Plugin::of::<ExternalExporterConfig>());

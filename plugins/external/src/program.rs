@@ -54,9 +54,7 @@ impl Program {
     pub(crate) fn new(
         command: Vec<String>,
         folder: &Path,
-        timeout_s: f64,
-        memory_mb: Option<u64>,
-        output_mb: u64,
+        (timeout_s, memory_mb, output_mb): (f64, Option<u64>, u64),
     ) -> Result<Self, Fault> {
         if command.first().is_none_or(String::is_empty) {
             let fault = Fault::at("command", "expected a program and its arguments, found none");

@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
 mod conformance;
+mod corrector;
 mod effect;
 mod evaluator;
 mod exporter;

@@ -44,14 +44,14 @@ pub(crate) fn marks(first: f64, length: f64, count: usize) -> Vec<f64> {
 pub(crate) fn conditioner<C: StageConfig<Stage = Preprocessor>>(config: C) -> Box<dyn Conditioner> {
     match config.check(&Context { folder: Path::new(""), rig: None }).unwrap() {
         Preprocessor::Conditioner(conditioner) => conditioner,
-        Preprocessor::Averager(_) => panic!("an averager"),
+        _ => panic!("no conditioner"),
     }
 }
 
 pub(crate) fn averager<C: StageConfig<Stage = Preprocessor>>(config: C) -> Box<dyn Averager> {
     match config.check(&Context { folder: Path::new(""), rig: None }).unwrap() {
         Preprocessor::Averager(averager) => averager,
-        Preprocessor::Conditioner(_) => panic!("a conditioner"),
+        _ => panic!("no averager"),
     }
 }
 

@@ -37,7 +37,7 @@ fn averager() -> Box<dyn Averager> {
     };
     match average.check(&Context { folder: Path::new(""), rig: None }).unwrap() {
         Preprocessor::Averager(averager) => averager,
-        Preprocessor::Conditioner(_) => panic!("no averager"),
+        _ => panic!("no averager"),
     }
 }
 

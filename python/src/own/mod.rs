@@ -38,7 +38,7 @@ use separator::OwnSeparator;
 pub(crate) struct Own {
     name: String,
     about: String,
-    /// The method that says what it is: "operator", "transfer", "separate", "values", "load", "captures", "evaluate" or "export".
+    /// The method that says what it is: "operator", "transfer", "preprocess", "separate", "values", "load", "captures", "evaluate" or "export".
     method: String,
     /// Name, unit and tolerance of each parameter of an effect.
     parameters: Vec<(String, String, f64)>,
@@ -77,6 +77,7 @@ pub(crate) fn register(registry: &mut Registry, plugins: Vec<Own>, stop: &Stop) 
                 continue;
             }
             "values" => CodeKind::Points { columns, labels, symbols },
+            "preprocess" => CodeKind::Preprocessor,
             "load" => CodeKind::Loader(Gives::Points),
             "captures" => CodeKind::Loader(Gives::Samples),
             "evaluate" => CodeKind::Evaluator(symbols),
@@ -92,6 +93,7 @@ pub(crate) fn register(registry: &mut Registry, plugins: Vec<Own>, stop: &Stop) 
 fn is_taken(registry: &Registry, name: &str, method: &str) -> bool {
     match method {
         "transfer" => registry.effects.iter().any(|known| known.name == name),
+        "preprocess" => registry.preprocessors.iter().any(|known| known.name == name),
         "load" | "captures" => registry.loaders.iter().any(|known| known.name == name),
         "evaluate" => registry.evaluators.iter().any(|known| known.name == name),
         "export" => registry.exporters.iter().any(|known| known.name == name),

@@ -21,7 +21,8 @@ pub use points::{
     LinearModel, Outcome, PointDiagnosis, PointModel, PointSeparator, far_below_noise, residual_table,
     separate_declared,
 };
-pub use preprocessor::{AverageRequest, Averager, Conditioner, Preprocessor, sample_rate_hz};
+pub(crate) use preprocessor::Corrected;
+pub use preprocessor::{AverageRequest, Averager, Conditioner, Corrector, Preprocessor, sample_rate_hz};
 pub use runout_evaluate::evaluable::{AxisMotion, Evaluable, EvaluableKind, Form, MotionErrors, OpenProfile, PlaneMap};
 pub use separator::{Separator, Station, StationDiagnosis, StationModel, StationSeparator, require_rig};
 pub use simulator::{Simulation, Simulator};

@@ -4,15 +4,18 @@ use runout_error::Result;
 use runout_turning::{
     measurement::{Capture, SampleStream},
     profile::Profile,
+    profile_change::ProfileChange,
     spread::Projection,
 };
 
-/// A preprocessor, by what it gives. A pipeline has any number of conditioners and then one averager.
+/// A preprocessor, by what it gives. A pipeline has any number of conditioners, then one averager, then any number of correctors.
 pub enum Preprocessor {
     /// Samples in, samples out.
     Conditioner(Box<dyn Conditioner>),
     /// Samples in, a profile out.
     Averager(Box<dyn Averager>),
+    /// A profile in, a profile out.
+    Corrector(Box<dyn Corrector>),
 }
 
 /// Changes samples, or what is known of them, block by block.
@@ -50,6 +53,33 @@ pub trait Averager: Send + Sync {
     /// When the source fails or too little of it can be used.
     fn average(&self, input: Box<dyn SampleStream + '_>) -> Result<Profile> {
         self.average_requested(input, AverageRequest::default())
+    }
+}
+
+/// Changes the average of a capture, harmonic by harmonic.
+pub trait Corrector: Send + Sync {
+    /// What becomes of a profile.
+    ///
+    /// # Errors
+    /// When it cannot say.
+    fn change(&self, profile: &Profile) -> Result<ProfileChange>;
+}
+
+/// An averager whose profiles a corrector changes.
+pub(crate) struct Corrected {
+    pub averager: Box<dyn Averager>,
+    pub corrector: Box<dyn Corrector>,
+}
+
+impl Averager for Corrected {
+    fn max_order(&self) -> usize {
+        self.averager.max_order()
+    }
+
+    fn average_requested(&self, input: Box<dyn SampleStream + '_>, wanted: AverageRequest) -> Result<Profile> {
+        let profile = self.averager.average_requested(input, wanted)?;
+        let change = self.corrector.change(&profile)?;
+        Ok(profile.changed(&change))
     }
 }
 

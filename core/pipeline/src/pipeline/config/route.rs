@@ -8,8 +8,8 @@ use crate::{
     },
     points::PointColumn,
     stage::{
-        Averager, Conditioner, EvaluableKind, PointModel, PointSeparator, Preprocessor, Separator, StationModel,
-        StationSeparator,
+        Averager, Conditioner, Corrected, EvaluableKind, PointModel, PointSeparator, Preprocessor, Separator,
+        StationModel, StationSeparator,
     },
 };
 use runout_closed_loop::Effect;
@@ -145,16 +145,25 @@ pub(super) fn turns(
     effects: &EffectCatalogue,
 ) -> Result<(Route, Option<Assessment>), Fault> {
     let mut conditioners = Vec::new();
-    let mut averager = None;
+    let mut averager: Option<Box<dyn Averager>> = None;
     for (preprocessor, table) in preprocessors {
-        if averager.is_some() {
-            let fault = Fault::at("plugin", "no preprocessor can follow the one that averages the turns");
-            return Err(document::resolve(fault.help("move it above"), &table));
-        }
-        match preprocessor {
-            Preprocessor::Conditioner(conditioner) => conditioners.push(conditioner),
-            Preprocessor::Averager(found) => averager = Some(found),
-        }
+        averager = match (preprocessor, averager) {
+            (Preprocessor::Conditioner(conditioner), None) => {
+                conditioners.push(conditioner);
+                None
+            }
+            (Preprocessor::Averager(found), None) => Some(found),
+            (Preprocessor::Corrector(corrector), Some(averager)) => Some(Box::new(Corrected { averager, corrector })),
+            (Preprocessor::Corrector(_), None) => {
+                let fault = Fault::at("plugin", "it changes averages, and nothing has averaged the turns yet");
+                return Err(document::resolve(fault.help("move it below plugin = \"synchronous-average\""), &table));
+            }
+            (Preprocessor::Conditioner(_) | Preprocessor::Averager(_), Some(_)) => {
+                let fault =
+                    Fault::at("plugin", "no preprocessor of samples can follow the one that averages the turns");
+                return Err(document::resolve(fault.help("move it above"), &table));
+            }
+        };
     }
     let averager = averager.ok_or_else(|| {
         let fault = Fault::at("preprocess", "the turns are never averaged");
