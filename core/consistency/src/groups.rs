@@ -78,11 +78,13 @@ pub fn compared(groups: &[Group], level: Level) -> Vec<Compared> {
     judged.iter().map(one).collect()
 }
 
+/// Mean square over that of the others below which a group has none.
+const CONSTANT: f64 = 1e-6;
 /// Degrees of freedom from which a group is judged.
 const LEAST_FREEDOM: f64 = 0.5;
 
 /// The least likely group as a [`Check`], and every other one that is a finding: `what` the groups are, in the plural, `why` what a group
-/// below the others may come from.
+/// below the others may come from. Two groups are one comparison.
 #[must_use]
 pub fn alike(what: &str, groups: &[Group], level: Level, why: &str) -> Vec<Check> {
     said(what, groups, compared(groups, level), level, why)
@@ -91,9 +93,13 @@ pub fn alike(what: &str, groups: &[Group], level: Level, why: &str) -> Vec<Check
 /// The same of groups that are [`compared`] already.
 #[must_use]
 pub fn said(what: &str, groups: &[Group], mut all: Vec<Compared>, level: Level, why: &str) -> Vec<Check> {
-    all.sort_by(|a, b| a.p.total_cmp(&b.p).then(a.group.cmp(&b.group)));
+    all.sort_by(|a, b| a.p.total_cmp(&b.p).then(b.ratio.total_cmp(&a.ratio)).then(a.group.cmp(&b.group)));
+    let is_pair = level == Level::Others && all.len() == 2;
+    if is_pair && all[1].ratio < CONSTANT {
+        all.reverse();
+    }
     let others = if level == Level::Others { "the others" } else { "the noise" };
-    let found = all.iter().enumerate().filter(|(rank, one)| *rank == 0 || one.p < FINDING);
+    let found = all.iter().enumerate().filter(|(rank, one)| *rank == 0 || (one.p < FINDING && !is_pair));
     let checks = found.map(|(_, one)| {
         let name = &groups[one.group].name;
         let size = one.ratio.max(0.0).sqrt();
@@ -144,6 +150,20 @@ mod tests {
         let checks =
             alike("parts", &groups(&mut random, 6, 12, &|group| if group == 1 { 0.0 } else { 1.0 }), known, "copied");
         assert!(checks[0].finding.contains("copied") && checks[0].did == Action::Verdict, "{checks:?}");
+    }
+
+    #[test]
+    fn of_two_groups_the_larger_one_is_said_unless_the_other_is_constant() {
+        let of = |squares: [f64; 2]| {
+            let group = |(name, squares): (&str, f64)| Group { name: name.into(), squares, freedom: 30.0 };
+            let groups: Vec<Group> = ["a", "b"].into_iter().zip(squares).map(group).collect();
+            let checks = alike("parts", &groups, Level::Others, "copied");
+            assert_eq!(checks.len(), 1);
+            checks[0].finding.clone()
+        };
+        assert!(of([30.0, 30_000.0]).starts_with("b has 31.6 times"), "{}", of([30.0, 30_000.0]));
+        assert!(of([30_000.0, 30.0]).starts_with("a has 31.6 times"));
+        assert!(of([30.0, 0.0]).starts_with("b has only"), "{}", of([30.0, 0.0]));
     }
 
     #[test]

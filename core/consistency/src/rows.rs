@@ -8,7 +8,7 @@
 use nalgebra::{DMatrix, DVector};
 use runout_numerics::{least_squares::dot, statistics::f_tail};
 
-use crate::check::{Check, Test, chance};
+use crate::check::{Check, FINDING, Test, chance};
 use crate::structure::Structure;
 
 /// Share of the readings that may be suspect.
@@ -17,10 +17,23 @@ const MOST: f64 = 0.05;
 const MOST_SUSPECTS: usize = 50;
 /// Squared length of a reading's column outside the fit below which only that reading shows what it is off by.
 const LEAST_FREE: f64 = 1e-9;
-/// Chance, times the readings, below which a reading is named.
-const NAMED: f64 = 0.01;
 /// Degrees of freedom from which single readings are judged.
 const FEWEST: usize = 8;
+/// Variance of rounding to steps of 1.
+const OF_ROUNDING: f64 = 1.0 / 12.0;
+
+/// Least variance that numbers can show: that of rounding to their smallest difference. Of numbers that are not rounded it is next to nothing.
+fn of_resolution(numbers: impl Iterator<Item = f64>) -> f64 {
+    let mut sorted: Vec<f64> = numbers.collect();
+    sorted.sort_by(f64::total_cmp);
+    let size = sorted.iter().fold(0.0_f64, |size, one| size.max(one.abs()));
+    let steps = sorted.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > ROUNDING * size);
+    let least = steps.fold(f64::INFINITY, f64::min);
+    if least.is_finite() { OF_ROUNDING * least * least } else { 0.0 }
+}
+
+/// Relative difference that sums of equal numbers have.
+const ROUNDING: f64 = 1e-9;
 
 /// Readings that are not like the others.
 #[derive(Debug, Clone, PartialEq)]
@@ -58,7 +71,7 @@ pub fn unlike(residual: &[f64], basis: &[Vec<f64>]) -> Option<Rows> {
     let below = (dof - suspects.len()) as f64;
     let off = &values - fitted;
     let squares: f64 = off.iter().zip(kept.iter()).map(|(value, kept)| kept * value * value).sum();
-    let noise = (squares / below).sqrt();
+    let noise = (squares / below).max(of_resolution(residual.iter().copied())).sqrt();
     // Variance of a suspect's prediction, in units of the noise.
     let normal =
         columns.transpose() * DMatrix::from_fn(count, basis.len(), |row, column| kept[row] * columns[(row, column)]);
@@ -78,7 +91,7 @@ pub fn unlike(residual: &[f64], basis: &[Vec<f64>]) -> Option<Rows> {
     let tail = |t: f64| (f_tail(t * t, 1.0, below) * count as f64).min(1.0);
     let behind = |rank: usize| judged.get(rank).map_or(next, |(_, t)| *t);
     let apart = |rank: usize| judged[rank - 1].1 > (1.0 + (rank as f64).sqrt().recip()) * behind(rank);
-    let named = (1..=judged.len()).rev().find(|rank| apart(*rank) && tail(judged[*rank - 1].1) < NAMED).unwrap_or(0);
+    let named = (1..=judged.len()).rev().find(|rank| apart(*rank) && tail(judged[*rank - 1].1) < FINDING).unwrap_or(0);
     let rows: Vec<usize> = judged[..named].iter().map(|(row, _)| *row).collect();
     let farthest = judged.first().map_or(0.0, |(_, t)| *t);
     Some(Rows {
@@ -122,10 +135,11 @@ pub fn unlike_repeats(places: &[Vec<f64>]) -> Option<Rows> {
     repeated.sort_by(|one, other| other.mean_square().total_cmp(&one.mean_square()));
     let most = ((MOST * count as f64).ceil() as usize).clamp(1, MOST_SUSPECTS).min(count - 1);
     // Noise and degrees of freedom behind each rank, from none left out to all suspects.
+    let least = of_resolution(places.iter().flatten().copied());
     let mut behind = vec![(squares, dof)];
     for one in &repeated[..most] {
         let (squares, dof) = behind[behind.len() - 1];
-        behind.push(((squares - one.squares).max(0.0), dof - one.dof));
+        behind.push(((squares - one.squares).max((dof - one.dof) * least), dof - one.dof));
     }
     let ratio =
         |rank: usize, at: usize| repeated[at].mean_square() * behind[rank].1 / behind[rank].0.max(f64::MIN_POSITIVE);
@@ -135,7 +149,7 @@ pub fn unlike_repeats(places: &[Vec<f64>]) -> Option<Rows> {
         // A mean square of few readings has a longer tail than a reading: half of what single readings have to be apart by.
         repeated[rank - 1].mean_square() > (1.0 + 0.5 / (rank as f64).sqrt()).powi(2) * repeated[rank].mean_square()
     };
-    let named = (1..=most).rev().find(|rank| apart(*rank) && tail(*rank, rank - 1) < NAMED).unwrap_or(0);
+    let named = (1..=most).rev().find(|rank| apart(*rank) && tail(*rank, rank - 1) < FINDING).unwrap_or(0);
     let rank = named.max(1);
     let chosen = &repeated[..named];
     Some(Rows {
@@ -184,7 +198,7 @@ fn suspects(residual: &[f64], basis: &[Vec<f64>], dof: usize) -> Vec<usize> {
         let rest = (dot(&left, &left) - taken).max(0.0);
         let p = f_tail(taken / (rest / below).max(f64::MIN_POSITIVE), 1.0, below) * (count - chosen.len()) as f64;
         chosen.push(row);
-        if p < NAMED {
+        if p < FINDING {
             last = chosen.len();
         }
         let mut direction = vec![0.0; count];
@@ -257,6 +271,21 @@ mod tests {
 
     fn line(count: usize) -> Basis {
         Basis::of(vec![vec![1.0; count], (0..count).map(|at| at as f64).collect()])
+    }
+
+    /// Readings that a coarse resolution makes equal but for one are no more than rounded.
+    #[test]
+    fn a_step_of_the_resolution_is_not_named() {
+        let level = Basis::of(vec![vec![1.0; 12]]);
+        let left = |one: f64, step: f64| {
+            let mut values: Vec<f64> = (0..12).map(|at| step * f64::from(u8::from(at % 4 == 1))).collect();
+            values[7] = one;
+            level.remove_from(&mut values);
+            unlike(&values, level.columns()).unwrap().rows
+        };
+        assert_eq!(left(1.0, 0.0), [0_usize; 0]);
+        assert_eq!(left(2.0, 1.0), [0_usize; 0]);
+        assert_eq!(left(20.0, 1.0), [7]);
     }
 
     #[test]
