@@ -2,10 +2,11 @@
 
 use runout_core::{
     Error, ErrorKind, Result,
+    consistency::{Check, Test},
     draws::OpenErrors,
     height_grid::GridPlaces,
     points::Points,
-    stage::{Evaluable, OpenProfile, Outcome},
+    stage::{Evaluable, OpenProfile, Outcome, far_below_noise},
     table::{ColumnSpec, Figure, Measure, TableRows, TableSpec, numbers},
 };
 
@@ -18,6 +19,10 @@ use crate::{
 const NO_NOISE: &str = "a profile that was measured once does not show its noise: what differs from point to point may be texture. A column `std_nm` states \
     it";
 const NM_PER_UM: f64 = 1e3;
+/// Variance of third differences of independent numbers, 1 + 9 + 9 + 1, and the share of them that is independent: 20² over the sum of the squares of
+/// their covariances 20, −15, 6, −1 on both sides.
+const OF_THIRD_DIFFERENCES: f64 = 20.0;
+const INDEPENDENT: f64 = 400.0 / 924.0;
 
 /// The table of the profile.
 pub(crate) fn table() -> TableSpec {
@@ -71,6 +76,7 @@ pub(crate) fn outcome(points: &Points, config: &AsMeasuredConfig) -> Result<Outc
         }
         None => Err(NO_NOISE.to_owned()),
     };
+    let checks: Vec<Check> = errors.iter().filter_map(|errors| overstated(&grid.height_nm, &errors.std_um)).collect();
     let deviation_um: Vec<f64> = grid.height_nm.iter().map(|height| height / NM_PER_UM).collect();
     let known = || z_mm.iter().zip(&grid.height_nm).filter(|(_, height)| height.is_finite());
     if known().count() < 3 {
@@ -92,8 +98,22 @@ pub(crate) fn outcome(points: &Points, config: &AsMeasuredConfig) -> Result<Outc
             deviation_um,
             errors,
         })],
+        checks,
         remarks: remarks.into_iter().collect(),
         notes: vec![sentence(&staged.stages)],
         ..Outcome::default()
+    })
+}
+
+/// Whether neighbouring points scatter far less than is stated: third differences have the noise and what the profile adds to it.
+fn overstated(height_nm: &[f64], std_um: &[f64]) -> Option<Check> {
+    let differences = height_nm.windows(4).map(|four| four[3] - 3.0 * four[2] + 3.0 * four[1] - four[0]);
+    let known: Vec<f64> = differences.filter(|one| one.is_finite()).collect();
+    let stated = std_um.iter().map(|std| (NM_PER_UM * std).powi(2)).sum::<f64>() / std_um.len() as f64;
+    let ratio = known.iter().map(|one| one * one).sum::<f64>() / (OF_THIRD_DIFFERENCES * stated * known.len() as f64);
+    let dof = (INDEPENDENT * known.len() as f64) as usize;
+    far_below_noise(ratio, dof).map(|words| {
+        Check::new(Test::Residual, "noise of neighbouring points", ratio, &[dof as f64], 0.0)
+            .finding(|| format!("neighbouring points scatter by less than `std_nm`: {words}"))
     })
 }

@@ -1,7 +1,13 @@
 //! Readings of a size that shows numbers in another unit: a thousand times larger or smaller than those of other channels, beyond
 //! the range of displacement sensors, or below their noise.
 
-use runout_core::{Complex64, numerics::number::significant, rig::Rig};
+use runout_core::{
+    Complex64,
+    consistency::{Check, Test},
+    numerics::number::significant,
+    points::measured::unlike_units,
+    rig::Rig,
+};
 
 use crate::solve::Readings;
 
@@ -17,16 +23,12 @@ const LARGEST_UM: f64 = 2000.0;
 const SMALLEST_UM: f64 = 0.005;
 
 /// Names each sensor whose readings are about a thousand times smaller or larger than the median of the other sensors that look
-/// the same way, and readings of millimetres in all that look across the axis, or of a few nanometres in all.
-pub(crate) fn mistaken_units(rig: &Rig, readings: &Readings) -> Vec<String> {
+/// the same way, and setups likewise.
+pub(crate) fn mistaken_units(rig: &Rig, readings: &Readings) -> Vec<Check> {
+    let sizes = sizes(rig, readings);
     let sensors = rig.sensors.len();
-    let size = |sensor: usize| {
-        let orders = readings.mean.chunks_exact(readings.count).skip(1);
-        orders.flat_map(|order| order.iter().skip(sensor).step_by(sensors)).map(Complex64::norm_sqr).sum::<f64>().sqrt()
-    };
-    let sizes: Vec<f64> = (0..sensors).map(size).collect();
     let near = |ratio: f64| (BETWEEN_UNITS / USUAL_RATIO..BETWEEN_UNITS * USUAL_RATIO).contains(&ratio);
-    let looks_along = |sensor: usize| rig.sensors[sensor].axial_radius_mm.is_some();
+    let looks_along = |sensor: usize| looks_along(rig, sensor);
     let said = |sensor: usize| {
         let others = (0..sensors).filter(|other| *other != sensor && looks_along(*other) == looks_along(sensor));
         let mut others: Vec<f64> = others.map(|other| sizes[other]).collect();
@@ -51,7 +53,16 @@ pub(crate) fn mistaken_units(rig: &Rig, readings: &Readings) -> Vec<String> {
             None
         }
     };
-    let least_um = (0..sensors).filter(|sensor| !looks_along(*sensor)).map(|sensor| sizes[sensor]).reduce(f64::min);
+    let check =
+        |words: String| Check::new(Test::Measured, "units of the sensors", BETWEEN_UNITS, &[], 0.0).finding(|| words);
+    (0..sensors).filter_map(said).map(check).chain(unlike_units(&setups(rig, readings))).collect()
+}
+
+/// What to ask where all sensors across the axis read millimetres, or all of them a few nanometres.
+pub(crate) fn unusual_sizes(rig: &Rig, readings: &Readings) -> Vec<String> {
+    let sizes = sizes(rig, readings);
+    let across = (0..sizes.len()).filter(|sensor| !looks_along(rig, *sensor));
+    let least_um = across.map(|sensor| sizes[sensor]).reduce(f64::min);
     let beyond = least_um.filter(|least_um| *least_um > LARGEST_UM).map(|least_um| {
         format!(
             "all sensors across the axis read more than {:.1} mm over a turn: they may be in a smaller unit than declared: write `unit = \"um\"` or \
@@ -60,7 +71,7 @@ pub(crate) fn mistaken_units(rig: &Rig, readings: &Readings) -> Vec<String> {
         )
     });
     // Setups add up in a size.
-    let setups = (readings.count / sensors.max(1)).max(1) as f64;
+    let setups = (readings.count / sizes.len().max(1)).max(1) as f64;
     let most_um = sizes.iter().copied().fold(0.0, f64::max) / setups.sqrt();
     let below = (most_um > 0.0 && most_um < SMALLEST_UM).then(|| {
         format!(
@@ -69,28 +80,33 @@ pub(crate) fn mistaken_units(rig: &Rig, readings: &Readings) -> Vec<String> {
             significant(2.0 * most_um, 2)
         )
     });
-    (0..sensors).filter_map(said).chain(beyond).chain(below).chain(unlike_setups(rig, readings, near)).collect()
+    beyond.into_iter().chain(below).collect()
 }
 
-/// A setup whose readings are a thousand times larger than those of another one, without their centring.
-fn unlike_setups(rig: &Rig, readings: &Readings, near: impl Fn(f64) -> bool) -> Option<String> {
+fn looks_along(rig: &Rig, sensor: usize) -> bool {
+    rig.sensors[sensor].axial_radius_mm.is_some()
+}
+
+/// Size of the readings of each sensor, over all setups.
+fn sizes(rig: &Rig, readings: &Readings) -> Vec<f64> {
+    let sensors = rig.sensors.len();
+    let size = |sensor: usize| {
+        let orders = readings.mean.chunks_exact(readings.count).skip(1);
+        orders.flat_map(|order| order.iter().skip(sensor).step_by(sensors)).map(Complex64::norm_sqr).sum::<f64>().sqrt()
+    };
+    (0..sensors).map(size).collect()
+}
+
+/// Size of the readings of each setup without their centring, with its name.
+fn setups(rig: &Rig, readings: &Readings) -> Vec<(String, f64)> {
     let sensors = rig.sensors.len();
     let size = |setup: usize| {
         let orders = readings.mean.chunks_exact(readings.count).skip(2);
         let own = orders.flat_map(|order| order.iter().skip(setup * sensors).take(sensors));
         own.map(Complex64::norm_sqr).sum::<f64>().sqrt()
     };
-    let sizes = || (0..readings.count / sensors.max(1)).map(|setup| (size(setup), setup));
-    let (small, smallest) = sizes().min_by(|one, other| one.0.total_cmp(&other.0))?;
-    let (large, largest) = sizes().max_by(|one, other| one.0.total_cmp(&other.0))?;
-    let id = |setup: usize| rig.setups.get(setup).map_or("", |setup| setup.id.as_str());
-    near(large / small).then(|| {
-        format!(
-            "the readings of setup `{}` are {:.0} times larger than those of setup `{}`: one of them may be in another unit (millimetres or \
-             nanometres where µm is declared): convert its file",
-            id(largest),
-            large / small,
-            id(smallest)
-        )
-    })
+    let named = |setup: usize| {
+        (format!("setup `{}`", rig.setups.get(setup).map_or("", |setup| setup.id.as_str())), size(setup))
+    };
+    (0..readings.count / sensors.max(1)).map(named).collect()
 }

@@ -68,7 +68,8 @@ impl GridPlaces {
         let mut sorted = node.clone();
         sorted.sort_unstable();
         if let Some(pair) = sorted.windows(2).find(|pair| pair[0] == pair[1]) {
-            return Err(format!("two points are at x = {} mm", x.first + x.step * f64::from(pair[0])));
+            let twice = node.iter().zip(x_mm).find(|(node, _)| **node == pair[0]).map_or(f64::NAN, |(_, x_mm)| *x_mm);
+            return Err(format!("two points are at x = {twice} mm"));
         }
         let Line { count: columns, step: step_x_mm, first } = x;
         Ok(Self { rows: 1, columns, step_x_mm, step_y_mm: step_x_mm, origin_mm: [first, y_mm], node })

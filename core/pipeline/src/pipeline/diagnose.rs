@@ -224,7 +224,7 @@ fn diagnose_points(
     let mut found = model.diagnose(points, &Settings { max_added: MOST_ADDED, ..settings })?;
     let checks = measured::checks(points, &separator.columns());
     found.diagnosis.refute(&checks);
-    found.after.checks.extend(checks);
+    found.after = found.after.tested(checks);
     let effects = corrections(&changes(known, &found.diagnosis));
     let of_run = point_run::findings(pipeline, points, separator)?;
     let mut diagnosis = Diagnosis { lost_orders: found.after.lost_orders.clone(), ..found.diagnosis };

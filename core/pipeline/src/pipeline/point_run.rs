@@ -35,8 +35,7 @@ pub(super) fn findings(pipeline: &Pipeline, points: &Points, separator: &dyn Poi
 
 fn declared<'a>(separator: &'a dyn PointSeparator, points: &Points) -> Result<PointResult<'a>> {
     measured::refuse_impossible(points)?;
-    let mut outcome = separator.separate(points)?;
-    outcome.checks.extend(measured::checks(points, &separator.columns()));
+    let mut outcome = separator.separate(points)?.tested(measured::checks(points, &separator.columns()));
     outcome.remarks.extend(measured::units(points, &separator.columns()));
     Ok(PointResult { outcome, remarks: Some(separator), effects: Vec::new(), diagnosis: None })
 }

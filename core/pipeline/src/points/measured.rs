@@ -16,14 +16,41 @@ const COARSE_STRETCH: usize = 40;
 const COARSE: f64 = 1e-3;
 /// Part of the last digit by which readings may be off it.
 const ON_GRID: f64 = 1e-3;
-/// Rows that are copies matter from this share of all on.
+/// Rows that are copies matter from this share of all on, or from so many stretches.
 const MATTERS: f64 = 0.1;
+const LONG: usize = 2;
 /// Numbers beyond this are nothing that was measured, in any unit; sums of their squares leave the range of numbers.
 const LARGEST: f64 = 1e100;
 /// Ranges of readings in µm that machines and their parts have: below, numbers are in mm, above, in nm.
 const USUAL_UM: [f64; 2] = [0.01, 2e4];
 /// Fewest rows that show whether a column varies.
 const FEWEST_ROWS: usize = 6;
+/// A column that stays at one number for so many times as long as usual is stuck there.
+const STUCK: usize = 40;
+/// From one unit of length to the next, and how much parts of one measurement differ in size besides.
+const BETWEEN_UNITS: f64 = 1e3;
+const USUAL_RATIO: f64 = 3.0;
+
+/// Parts of one measurement (sets, setups, diagonals) of which one is a thousand times larger or smaller than the others, each by its name and size:
+/// its numbers are in another unit.
+#[must_use]
+pub fn unlike_units(parts: &[(String, f64)]) -> Option<Check> {
+    let near = |ratio: f64| (BETWEEN_UNITS / USUAL_RATIO..BETWEEN_UNITS * USUAL_RATIO).contains(&ratio);
+    let odd = parts.iter().enumerate().find_map(|(at, (name, size))| {
+        let ratios = || parts.iter().enumerate().filter(|(other, _)| *other != at).map(|(_, one)| size / one.1);
+        let nearest = ratios().min_by(|a, b| a.ln().abs().total_cmp(&b.ln().abs()))?;
+        (ratios().all(near) || ratios().all(|ratio| near(ratio.recip()))).then_some((name, nearest))
+    });
+    let (name, ratio) = odd?;
+    let found = || {
+        let (times, how) = if ratio > 1.0 { (ratio, "larger") } else { (ratio.recip(), "smaller") };
+        let beside = if parts.len() > 2 { "the others" } else { "the other one" };
+        format!(
+            "the readings of {name} are {times:.0} times {how} than those of {beside}: one has another unit (millimetres, µm, nanometres); convert its file"
+        )
+    };
+    Some(Check::new(Test::Measured, format!("unit of {name}"), ratio, &[], 0.0).finding(found))
+}
 
 /// Refuses numbers that are nothing that was measured.
 ///
@@ -50,12 +77,13 @@ pub fn checks(points: &Points, columns: &[PointColumn]) -> Vec<Check> {
         .filter(|column| column.measured)
         .filter_map(|column| Some((column, points.column(column.name).ok()?)))
         .collect();
-    measured
+    let stuck: Vec<Check> = measured.iter().filter_map(|(column, values)| stuck(column.name, values)).collect();
+    let moves = |name: &str| stuck.iter().all(|check| check.of != name);
+    let copies = measured
         .iter()
-        .find_map(|(column, values)| copied(column.name, values))
-        .into_iter()
-        .chain(unmeasured(&measured))
-        .collect()
+        .filter(|(column, _)| moves(column.name))
+        .find_map(|(column, values)| copied(column.name, values));
+    copies.into_iter().chain(equal_columns(&measured)).chain(unmeasured(&measured)).chain(stuck).collect()
 }
 
 /// Columns whose numbers look as if they had another unit than their name says.
@@ -98,7 +126,9 @@ fn copied(name: &str, values: &[f64]) -> Option<Check> {
     let doubled = bits.windows(2).filter(|pair| pair[0] == pair[1]).count();
     let copies = is_copy.iter().filter(|is_copy| **is_copy).count();
     let count = values.len();
-    let enough = |copies: usize| copies >= stretch && copies as f64 >= MATTERS * count as f64;
+    // What is written with many digits and comes again at such length is a copy, however short beside the whole.
+    let is_long = |copies: usize| !is_coarse(values) && copies >= LONG * stretch;
+    let enough = |copies: usize| is_long(copies) || (copies >= stretch && copies as f64 >= MATTERS * count as f64);
     let words = match first {
         Some([earlier, row]) if enough(copies) => format!(
             "{copies} of {count} readings `{name}` are equal to earlier ones in the same order, digit by digit, from row {} on to those from row {} on",
@@ -125,16 +155,58 @@ fn is_coarse(values: &[f64]) -> bool {
     sorted.iter().all(|value| (value / digit - (value / digit).round()).abs() < ON_GRID)
 }
 
-/// Columns that the method needs and that hold one number, where others vary.
+/// A column that stays at one number for long and varies elsewhere. What is written with few digits may stand still by right.
+fn stuck(name: &str, values: &[f64]) -> Option<Check> {
+    if is_coarse(values) {
+        return None;
+    }
+    let runs: Vec<&[f64]> = values.chunk_by(|a, b| a.to_bits() == b.to_bits()).collect();
+    let mut lengths: Vec<usize> = runs.iter().map(|run| run.len()).collect();
+    lengths.sort_unstable();
+    let usual = lengths.get(lengths.len() / 2).copied().unwrap_or_default();
+    let mut row = 0;
+    for run in &runs {
+        if run.len() < values.len() && run.len() >= STUCK * usual && run.len() as f64 >= MATTERS * values.len() as f64 {
+            let found = || {
+                format!(
+                    "`{name}` is {} in each of {} rows, from row {} on: it was stuck there, and what is said by it does not hold",
+                    run[0],
+                    run.len(),
+                    row + 1
+                )
+            };
+            return Some(
+                Check::new(Test::Measured, name, run.len() as f64 / values.len() as f64, &[], 0.0).finding(found),
+            );
+        }
+        row += run.len();
+    }
+    None
+}
+
+/// Columns that are equal digit by digit, but for a few rows.
+fn equal_columns(measured: &[(&PointColumn, &[f64])]) -> Option<Check> {
+    let pairs = measured.iter().enumerate().flat_map(|(at, one)| measured[..at].iter().map(move |other| (other, one)));
+    let mut equal = pairs.filter(|((_, one), (_, other))| {
+        let same = one.iter().zip(*other).filter(|(a, b)| a.to_bits() == b.to_bits()).count();
+        one.len() >= FEWEST_ROWS && same as f64 >= (1.0 - MATTERS) * one.len() as f64 && !is_coarse(one)
+    });
+    let ((one, _), (other, _)) = equal.next()?;
+    let found = || format!("`{}` and `{}` are equal digit by digit: one of them is a copy", one.name, other.name);
+    Some(Check::new(Test::Measured, one.name, 1.0, &[], 0.0).finding(found))
+}
+
+/// Columns that hold one number, where others vary.
 fn unmeasured(measured: &[(&PointColumn, &[f64])]) -> Vec<Check> {
     let is_constant = |values: &[f64]| values.windows(2).all(|pair| pair[0].to_bits() == pair[1].to_bits());
     let enough = |values: &[f64]| values.len() >= FEWEST_ROWS;
     let any_varies = measured.iter().any(|(_, values)| enough(values) && !is_constant(values));
-    let dead = measured.iter().filter(|(column, values)| any_varies && !column.optional && is_constant(values));
+    let dead = measured.iter().filter(|(_, values)| any_varies && is_constant(values));
     dead.map(|(column, values)| {
         let found = || {
+            let remedy = if column.optional { "; leave the column out" } else { "" };
             format!(
-                "`{}` is {} in every row: it was not measured, and what is said by it does not hold",
+                "`{}` is {} in every row: it was not measured, and what is said by it does not hold{remedy}",
                 column.name,
                 values.first().copied().unwrap_or_default()
             )
@@ -206,6 +278,16 @@ mod tests {
         assert!(refused.contains("`dx_mm` is -1e300 in row 2"), "{refused}");
         // The same of a grid of which few places are taken.
         assert_eq!(findings(|row| ((row % 20) * 37 % 191) as f64 * 1e-3, sound, 40), [""; 0]);
+        let stuck = findings(reading, |row| if row < 120 { sound(row) } else { sound(120) }, 200);
+        assert!(stuck.len() == 1 && stuck[0].contains("80 rows, from row 121 on"), "{stuck:?}");
+        let equal = findings(reading, reading, 200);
+        assert!(equal.len() == 1 && equal[0].contains("`dx_mm` and `dz_mm` are equal"), "{equal:?}");
+        let of = |size: f64| unlike_units(&[("set 1".into(), 1.1), ("set 2".into(), size), ("set 3".into(), 0.8)]);
+        assert!(
+            of(950.0)
+                .is_some_and(|check| check.finding.contains("set 2 are 864 times larger than those of the others"))
+        );
+        assert!(of(1e-3).is_some_and(|check| check.finding.contains("smaller")) && of(25.0).is_none());
         let dead = findings(reading, |_| 0.0123, 200);
         assert!(dead.len() == 1 && dead[0].contains("`dz_mm` is 0.0123 in every row"), "{dead:?}");
         assert_eq!(findings(|_| 0.0, |_| 0.0, 200), [""; 0]);

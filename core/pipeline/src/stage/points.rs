@@ -171,6 +171,16 @@ impl Outcome {
         })
     }
 
+    /// Adds tests of the readings themselves, whatever the method is: a finding refutes all values.
+    #[must_use]
+    pub(crate) fn tested(mut self, checks: Vec<Check>) -> Self {
+        if let Some(refuted) = refuted_by(&checks) {
+            self.values.iter_mut().for_each(|value| value.refuted_by = Some(refuted.clone()));
+        }
+        self.checks.extend(checks);
+        self
+    }
+
     /// Marks the values that its own checks refute: of a check of one part, the values of this part, by what they are of or by their symbol;
     /// of a check of the whole, or where no value names the part, all.
     #[must_use]
@@ -221,10 +231,23 @@ impl<M: LinearModel> PointModel for M {
         let mut after = self.outcome(points, &closed.after)?;
         after.checks.extend(closed.diagnosis.consistency.iter().cloned());
         after.tables.push(residual_rows(&terms, &closed.before, &closed.after)?);
+        after.remarks.extend(hardly_tested(&closed.before));
         let mut diagnosis = closed.diagnosis;
         diagnosis.warnings.append(&mut after.remarks);
         Ok(PointDiagnosis { diagnosis, after: after.refuted() })
     }
+}
+
+/// Degrees of freedom below which readings hardly test what is said of them.
+const FEW_FREEDOM: usize = 5;
+
+/// Says that hardly anything tests a fit; nothing where something does.
+fn hardly_tested(fit: &LinearFit) -> Option<String> {
+    let dof = fit.remainder().dof;
+    let degrees = if dof == 1 { "degree" } else { "degrees" };
+    (dof < FEW_FREEDOM).then(|| {
+        format!("{dof} {degrees} of freedom beside what is fitted hardly test it: a drift or an offset as large as the values would not be seen")
+    })
 }
 
 /// The result of a linear model as it is declared, with the rows of [`residual_table`], which the separator's `tables` must declare.
@@ -237,6 +260,7 @@ pub fn separate_declared(model: &impl LinearModel, points: &Points) -> Result<Ou
     let mut outcome = model.outcome(points, &fit)?;
     outcome.checks.extend(fit.consistency());
     outcome.tables.push(residual_rows(&terms, &fit, &fit)?);
+    outcome.remarks.extend(hardly_tested(&fit));
     Ok(outcome.refuted())
 }
 

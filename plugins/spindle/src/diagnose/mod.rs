@@ -351,8 +351,9 @@ fn run(model: &SpindleModel, stations: &[Station], settings: &Settings) -> Resul
     }
     let rig = &model.traced.selection.rig;
     for data in &model.traced.data {
-        diagnosis.warnings.extend(wiring::copies(rig, &data.readings).into_iter().map(|check| check.finding));
-        diagnosis.warnings.extend(sizes::mistaken_units(rig, &data.readings));
+        let said = wiring::copies(rig, &data.readings).into_iter().chain(sizes::mistaken_units(rig, &data.readings));
+        diagnosis.warnings.extend(said.map(|check| check.finding));
+        diagnosis.warnings.extend(sizes::unusual_sizes(rig, &data.readings));
     }
     let highest = TRACED_ORDERS.min(closed.after.max_order());
     if model.traced.layout.assess(highest).has_no_observable_form() {

@@ -18,14 +18,16 @@ pub(super) fn separate(
     method: impl FnOnce(&Readings) -> Operators,
 ) -> Result<Separation> {
     let (mut separation, readings) = solver.separate(station, method)?;
-    separation.residual.checks.extend(wiring::copies(&solver.selection.rig, &readings));
+    let rig = &solver.selection.rig;
+    separation.residual.checks.extend(wiring::copies(rig, &readings));
     let mut warnings = Vec::new();
-    let units = sizes::mistaken_units(&solver.selection.rig, &readings);
+    let units = sizes::mistaken_units(rig, &readings);
     if units.is_empty() && separation.residual.chi2_per_dof > wiring::SUSPICIOUS_CHI2 {
         let weights = whitening(&readings);
         warnings.extend(wiring::warning(solver.selection, solver.layout, &readings, weights.as_deref()));
     }
-    warnings.extend(units);
+    separation.residual.checks.extend(units);
+    warnings.extend(sizes::unusual_sizes(rig, &readings));
     separation.warnings.splice(..0, warnings);
     Ok(separation)
 }
