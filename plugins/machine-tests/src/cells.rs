@@ -1,14 +1,17 @@
 //! Means and standard deviations of approaches, the values of ISO 230-2 of them, and what is to be said of the runs.
 
-use runout_core::draws::Draw;
+use runout_core::{
+    consistency::{Action, Check, Test},
+    draws::Draw,
+    numerics::{number::significant, statistics::chi2_tail},
+    summary::Value,
+};
 
-use crate::runs::{Approaches, Noise, mean, std};
+use crate::runs::{Approaches, Noise, Runs, mean, std};
 
-/// Runs are off as a whole where their means scatter by so many times what the noise at single targets makes.
-const OFF: f64 = 3.0;
-/// They drift where their means go with their number, by this correlation, which chance makes once in a hundred of five runs.
-const TREND: f64 = 0.93;
-const FEWEST_FOR_A_TREND: usize = 4;
+/// First letters of values that contain a drift by their definition: repeatability, and accuracy with it.
+const CONTAIN_DRIFT: [char; 2] = ['R', 'A'];
+
 /// How remarks name what a test has.
 pub(crate) struct Terms {
     pub unit: &'static str,
@@ -36,15 +39,16 @@ pub(crate) fn remarks(approaches: &Approaches, noise: &Noise, terms: &Terms) -> 
     if noise.copies {
         remarks.push("the runs are identical: copies show no uncertainty".into());
     }
-    let std = noise.own_std / ((approaches.targets.len() * approaches.sides.len()) as f64).sqrt();
-    let trend = noise.trend();
-    if noise.common_std > OFF * std && std > 0.0 {
-        let change = noise.course.last().zip(noise.course.first()).map_or(0.0, |(last, first)| last - first);
-        remarks.push(if runs >= FEWEST_FOR_A_TREND && trend.abs() > TREND {
-            format!("the runs drift: the last one lies {change:+.2} {unit} from the first one on average over all targets; {contain}")
-        } else {
-            format!("runs differ as a whole, by a standard deviation of {:.2} {unit}; {contain}", noise.common_std)
-        });
+    let change = noise.course.last().zip(noise.course.first()).map_or(0.0, |(last, first)| last - first);
+    match noise.of_whole_runs(approaches.targets.len() * approaches.sides.len()) {
+        Runs::Alike => {}
+        Runs::Drift => remarks.push(format!(
+            "the runs drift: the last one lies {change:+.2} {unit} from the first one on average over all targets; {contain}"
+        )),
+        Runs::Differ => remarks.push(format!(
+            "runs differ as a whole, by a standard deviation of {:.2} {unit}; {contain}",
+            noise.common[0]
+        )),
     }
     if approaches.sides.len() == 1 {
         remarks.push(
@@ -52,6 +56,34 @@ pub(crate) fn remarks(approaches: &Approaches, noise: &Noise, terms: &Terms) -> 
         );
     }
     remarks
+}
+
+/// Widens what is known of values that are no measure of a drift by what they would change without one, where the runs drift, and says so of each
+/// that this matters for. `values` are those of [`Cells::values`], in that order.
+pub(crate) fn widen_by_drift(approaches: &Approaches, noise: &Noise, values: &mut [Value], unit: &str) -> Vec<Check> {
+    if noise.of_whole_runs(approaches.targets.len() * approaches.sides.len()) != Runs::Drift {
+        return Vec::new();
+    }
+    let without = Cells::of(&approaches.without_drift()).values(&approaches.sides);
+    let changed = values.iter_mut().zip(without).filter(|(value, _)| !value.symbol.starts_with(CONTAIN_DRIFT));
+    let check = |(value, (symbol, without, _)): (&mut Value, (String, f64, &str))| {
+        let (found, known) = (value.value, value.uncertainty.as_mut()?);
+        let change = found - without;
+        let factor = known.std.hypot(change) / known.std;
+        let ratio = (change / known.std).powi(2);
+        known.std *= factor;
+        known.interval_95 = known.interval_95.map(|end| (found + factor * (end - found)).max(0.0));
+        let check = Check::new(Test::Order, format!("{symbol} without drift"), ratio, &[1.0], chi2_tail(ratio, 1.0));
+        let mut check = check.widening(factor).finding(|| {
+            let [found, without] = [found, without].map(|value| significant(value, 3));
+            format!("the runs drift, also between the approaches from both sides and along the travel: without it, {symbol} would be {without}, not {found} {unit}; the interval contains both")
+        });
+        if check.did == Action::Verdict {
+            check.did = Action::Widened;
+        }
+        Some(check)
+    };
+    changed.filter_map(check).collect()
 }
 
 /// Means and standard deviations, `[target][side]`.
@@ -67,6 +99,13 @@ impl Cells {
             approaches.deviations.iter().map(|sides| sides.iter().map(|runs| of(runs)).collect()).collect()
         };
         Self { mean: each(mean), std: each(std) }
+    }
+
+    /// Range of all means.
+    pub(crate) fn size(&self) -> f64 {
+        let mut ends = Ends::default();
+        self.mean.iter().flatten().for_each(|mean| ends.take(*mean));
+        ends.range()
     }
 
     /// Means without the parts of their highest and lowest ones that noise may have made: in both directions alike, and in the reversal. Noise raises ranges
@@ -100,16 +139,21 @@ impl Cells {
     pub(crate) fn measured_again(&self, noise: &Noise, draw: &mut Draw) -> (Self, Self) {
         let freedom = noise.runs - 1;
         let own = noise.own_std * draw.true_std_ratio(noise.freedom_own);
-        let [common, slope] = [noise.common_std, noise.slope_std].map(|std| std * draw.true_std_ratio(freedom));
-        let runs: Vec<[f64; 2]> = (0..noise.runs).map(|_| [common * draw.normal(), slope * draw.normal()]).collect();
+        let mut wider = |of: [f64; 2]| of.map(|std| std * draw.true_std_ratio(freedom));
+        let (common, apart) = (wider(noise.common), wider(noise.apart));
+        let mut drawn = |of: [f64; 2]| of.map(|std| std * draw.normal());
+        let runs: Vec<[[f64; 2]; 2]> = (0..noise.runs).map(|_| [drawn(common), drawn(apart)]).collect();
         let (mut truth, mut again) = (self.clone(), self.clone());
         for (place, along) in noise.along.iter().enumerate() {
+            let off = |[level, tilt]: [f64; 2]| level + tilt * along;
+            let size = |[level, tilt]: [f64; 2]| level.hypot(tilt * along);
             for side in 0..self.mean[place].len() {
-                let of: Vec<f64> =
-                    runs.iter().map(|[level, tilt]| level + tilt * along + own * draw.normal()).collect();
+                let sign = if side == 0 { 1.0 } else { -1.0 };
+                let mut of = |[common, apart]: &[[f64; 2]; 2]| off(*common) + sign * off(*apart) + own * draw.normal();
+                let of: Vec<f64> = runs.iter().map(&mut of).collect();
                 again.mean[place][side] += mean(&of);
                 again.std[place][side] = std(&of);
-                truth.std[place][side] = common.hypot(slope * along).hypot(own);
+                truth.std[place][side] = size(common).hypot(size(apart)).hypot(own);
             }
         }
         (truth, again)

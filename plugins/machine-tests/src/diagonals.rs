@@ -11,6 +11,7 @@
 
 use runout_core::{
     Error, ErrorKind, Result,
+    consistency::Check,
     draws::{Draw, Truth, seed},
     fault::Fault,
     pipeline::{Context, StageConfig},
@@ -18,6 +19,7 @@ use runout_core::{
         PointColumn,
         PointKind::{Label, Number},
         Points,
+        measured::unlike_units,
     },
     stage::{Outcome, PointSeparator, Separator},
     table::{ColumnSpec, Figure, Measure, TableRows, TableSpec, numbers, texts},
@@ -26,7 +28,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use crate::{
-    cells::{Cells, Terms, remarks},
+    cells::{Cells, Terms, remarks, widen_by_drift},
     draws::{Computed, with_uncertainty},
     repeated,
     runs::{Approaches, Noise},
@@ -101,7 +103,8 @@ impl Diagonal {
 
     /// By so much noise moves one of its values at most, in µm: three standard deviations of the difference of two means.
     fn reach(&self) -> f64 {
-        let run = self.noise.common_std.hypot(self.noise.slope_std).hypot(self.noise.own_std);
+        let of_runs = self.noise.common.iter().chain(&self.noise.apart).map(|std| std * std).sum::<f64>();
+        let run = of_runs.sqrt().hypot(self.noise.own_std);
         3.0 * std::f64::consts::SQRT_2 * run / (self.noise.runs as f64).sqrt()
     }
 
@@ -223,22 +226,41 @@ impl PointSeparator for Diagonals {
             );
         }
         said.extend(missing(&all));
+        let sizes = all.iter().map(|one| (format!("diagonal {}", one.id), one.cells.size()));
+        let mut checks: Vec<Check> = unlike_units(&sizes.collect::<Vec<(String, f64)>>()).into_iter().collect();
+        let mut first = 0;
+        for one in &all {
+            let last = first + one.values().len();
+            let mut found = repeated::approaches(&one.approaches, &one.noise.along, ["mm", "µm"]);
+            found.extend(widen_by_drift(&one.approaches, &one.noise, &mut values[first..last], "µm"));
+            checks.extend(found.into_iter().map(|check| check.within(&one.id)));
+            first = last;
+        }
+        let place_of: Vec<usize> =
+            all.iter().scan(0, |first, one| Some(std::mem::replace(first, *first + one.values().len()))).collect();
         let outcome = Outcome {
             convention:
                 "deviation is actual less commanded distance along the diagonal; + is an approach ahead along it".into(),
             tables: vec![rows(&all)?],
             values: values.into_iter().zip(of).map(|(value, of)| value.of(&of)).collect(),
-            checks: all
-                .iter()
-                .flat_map(|one| {
-                    let found = repeated::approaches(&one.approaches, &one.noise.along, ["mm", "µm"]);
-                    found.into_iter().map(|check| check.within(&one.id))
-                })
-                .collect(),
+            checks,
             remarks: said,
             ..Outcome::default()
         };
-        Ok(outcome.refuted())
+        let mut outcome = outcome.refuted();
+        let (each, largest) = outcome.values.split_at_mut(first);
+        for (value, members) in largest.iter_mut().zip(&members) {
+            let own = members.iter().map(|(index, place, _)| &each[place_of[*index] + place]);
+            value.refuted_by = own.clone().find_map(|one| one.refuted_by.clone());
+            // What widens the value of the diagonal that it is of widens it.
+            let top = own.max_by(|a, b| a.value.total_cmp(&b.value)).and_then(|one| one.uncertainty.as_ref());
+            if let (Some(known), Some(top)) = (value.uncertainty.as_mut(), top) {
+                known.std = known.std.max(top.std);
+                let [low, high] = known.interval_95;
+                known.interval_95 = [low.min(top.interval_95[0]), high.max(top.interval_95[1])];
+            }
+        }
+        Ok(outcome)
     }
 }
 

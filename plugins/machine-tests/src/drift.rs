@@ -153,12 +153,18 @@ impl Drift {
         };
         let (lows, highs) = (drawn(Axis::least), drawn(Axis::most));
         let mut values: Vec<Value> = Vec::new();
+        let mut squares = 0.0;
         for (index, value) in found.into_iter().enumerate() {
-            let [low, high] = [(&lows, 0.025), (&highs, 0.975)].map(|(draws, share)| {
+            let [mut low, high] = [(&lows, 0.025), (&highs, 0.975)].map(|(draws, share)| {
                 let mut ends: Vec<f64> = draws.iter().map(|draw| draw[index]).collect();
                 ends.sort_by(f64::total_cmp);
                 ends[(share * (DRAWS - 1) as f64).round() as usize]
             });
+            match names.get(index) {
+                Some(_) => squares += low * low,
+                // Axes that may all stand still may all stand still together.
+                None => low = low.min(squares.sqrt()),
+            }
             let (symbol, about) = match names.get(index) {
                 Some(_) => ("drift", "range of the displacement over the test (ISO 230-3)"),
                 None => ("combined-drift", "root of the sum of the squares of the axes' ranges"),
@@ -288,7 +294,14 @@ impl Test {
         let usual = counts.get(counts.len() / 2).copied().unwrap_or_default();
         let is_filled = |block: &&[f64]| block.len() as f64 >= FILLED * usual as f64;
         let filled = blocks.iter().filter(|block| is_filled(block)).count();
-        let all = times_s.last().map_or(0, |last| window(*last) + 1);
+        // A last window that the test only begins is none.
+        let all = times_s.last().map_or(0, |last| window(*last)) + i64::from(blocks.last().is_some_and(is_filled));
+        let mut steps: Vec<f64> = times_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        steps.sort_by(f64::total_cmp);
+        if let Some(step_s) = steps.get(steps.len() / 2).filter(|step_s| **step_s > window_s) {
+            let problem = format!("a window of {window_s} s is shorter than the time between readings, {step_s} s");
+            return Err(refuse(problem, "state a longer `window_s`"));
+        }
         if filled < FEWEST_MEANS {
             let problem = format!("{filled} means over {window_s} s, expected at least {FEWEST_MEANS}");
             return Err(refuse(problem, "record for longer, or state a shorter `window_s`"));

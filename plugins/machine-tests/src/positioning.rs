@@ -30,7 +30,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use crate::{
-    cells::{Cells, Terms, remarks},
+    cells::{Cells, Terms, remarks, widen_by_drift},
     draws::{Computed, with_uncertainty},
     repeated,
     runs::Approaches,
@@ -165,6 +165,8 @@ impl PointSeparator for Positioning {
             values.iter_mut().for_each(|value| value.uncertainty = None);
         }
         let terms = Terms { unit: deviation.unit, runs: RUNS, standard: "ISO 230-2", contain: "A and R contain it" };
+        let mut checks = repeated::approaches(&approaches, &noise.along, [target.unit, deviation.unit]);
+        checks.extend(widen_by_drift(&approaches, &noise, &mut values, deviation.unit));
         let outcome = Outcome {
             convention: format!(
                 "deviation is actual less commanded position of {}; + is an approach in the positive direction",
@@ -172,7 +174,7 @@ impl PointSeparator for Positioning {
             ),
             tables: vec![self.rows(&approaches, &cells)?],
             values: values.into_iter().map(|value| value.of(&self.0.axis)).collect(),
-            checks: repeated::approaches(&approaches, &noise.along, [target.unit, deviation.unit]),
+            checks,
             remarks: remarks(&approaches, &noise, &terms),
             ..Outcome::default()
         };

@@ -15,6 +15,7 @@ mod range;
 
 use runout_core::{
     Error, ErrorKind, Result,
+    consistency::groups::{Level, alike},
     draws::{Draw, Truth, seed, without_noise},
     fault::Fault,
     pipeline::{Context, StageConfig},
@@ -22,6 +23,7 @@ use runout_core::{
         PointColumn,
         PointKind::{Label, Number},
         Points,
+        measured::unlike_units,
     },
     stage::{Outcome, PointSeparator, Separator},
     summary::Value,
@@ -45,6 +47,8 @@ const ON_SPHERE: usize = 25;
 const FEWEST: usize = 3;
 /// Sets of touches drawn for the mean range of one.
 const SETS: usize = 30;
+/// Length of the mean direction of the touches from which on they are on one side only.
+const LOPSIDED: f64 = 0.75;
 /// `[separate] plugin = "probing"`.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -187,6 +191,12 @@ impl Probing {
             said.remarks
                 .push(format!("{count} touches of a sphere: P_FTU,3D is of {ON_SPHERE}; fewer find less of the form"));
         }
+        if touches.lopsidedness() > LOPSIDED {
+            let of = if self.0.object == Object::Sphere { "a cap of the sphere" } else { "an arc of the ring" };
+            said.remarks.push(format!(
+                "the touches are on {of} alone: the form beyond it is in no value, and the value is too small"
+            ));
+        }
         let notes = vec![format!("{} sets of {count} touches", touches.sets.len())];
         let outcome = Outcome {
             convention: "a deviation is the distance of a touch from the centre of its set less the mean radius".into(),
@@ -220,10 +230,14 @@ impl Probing {
             said.remarks.push("the sets are identical: copies show no uncertainty".into());
             return plain;
         }
+        let sizes = touches.sets.iter().zip(&ranges).map(|(set, range)| (format!("set {}", set.number), *range));
+        said.checks.extend(unlike_units(&sizes.collect::<Vec<(String, f64)>>()));
         let names: Vec<String> = (1..=count).map(|set| format!("touch of set {set}:")).collect();
         let of_sets: Vec<(&str, &[f64])> =
             names.iter().map(String::as_str).zip(noise.iter().map(Vec::as_slice)).collect();
         said.checks.extend(in_order("the touches of a set", &of_sets, "µm"));
+        let copied = "its touches are copies, or it was not touched";
+        said.checks.extend(alike("sides", &touches.sides(), Level::Others, copied));
         said.checks.extend(in_order("the sets", &[("range of set", &ranges)], "µm"));
         let means = touches.means_um();
         let power = means.iter().map(|one| one * one).sum::<f64>() / (means.len() - touches.fit.rank()) as f64;

@@ -10,7 +10,7 @@ use crate::runs::{Approaches, mean};
 /// Series that are looked at, evenly taken of more.
 const MOST_SERIES: usize = 20;
 /// Parts of the travel whose scatter is compared.
-const PARTS: usize = 4;
+const PARTS: usize = 3;
 
 /// What the user should know, and what readings say of themselves.
 #[derive(Default)]
@@ -104,7 +104,7 @@ impl<'a> Series<'a> {
 }
 
 /// Approaches of targets: whether those of a run depend on each other along the travel, whether they scatter alike in all parts of it, and
-/// single ones unlike the others of their target; beside what a whole run is off by, at all targets and along the travel.
+/// single ones unlike the others of their target; beside what a whole run is off by from one side, at all targets and along the travel.
 pub(crate) fn approaches(of: &Approaches, along: &[f64], [place, unit]: [&str; 2]) -> Vec<Check> {
     let (runs, targets, sides) = (of.fewest_runs(), of.targets.len(), of.sides.len());
     // Orthonormal contrasts of the runs (Helmert): of independent runs they are independent, and have no mean.
@@ -129,10 +129,11 @@ pub(crate) fn approaches(of: &Approaches, along: &[f64], [place, unit]: [&str; 2
         let cell = &of.deviations[*target][*side][..runs];
         cell.iter().enumerate().map(|(run, one)| contrast(*number, run) * one).sum::<f64>()
     };
-    let column = |number: usize, of: &dyn Fn(usize) -> f64| -> Vec<f64> {
-        readings.iter().map(|(own, _, target)| if *own == number { of(*target) } else { 0.0 }).collect()
+    let column = |pass: (usize, usize), of: &dyn Fn(usize) -> f64| -> Vec<f64> {
+        readings.iter().map(|(number, side, target)| if (*number, *side) == pass { of(*target) } else { 0.0 }).collect()
     };
-    let whole = (0..runs - 1).flat_map(|number| [column(number, &|_| 1.0), column(number, &|target| along[target])]);
+    let passes = (0..runs - 1).flat_map(|number| (0..sides).map(move |side| (number, side)));
+    let whole = passes.flat_map(|pass| [column(pass, &|_| 1.0), column(pass, &|target| along[target])]);
     let basis = Basis::of(whole.collect());
     let mut residual: Vec<f64> = readings.iter().map(value).collect();
     basis.remove_from(&mut residual);

@@ -1,7 +1,20 @@
 //! Approaches of target positions: which target, from which side, in which run.
 
-use runout_core::{Error, ErrorKind, Result, points::Points};
+use runout_core::{
+    Error, ErrorKind, Result,
+    numerics::least_squares::{Basis, dot},
+    points::Points,
+};
 
+/// Runs are off as a whole where their means scatter by so many times what the noise at single targets makes.
+const OFF: f64 = 3.0;
+/// They drift where their means go with their number, by this correlation, which chance makes once in fifty of five runs; or where so many of them
+/// rise or fall one after the other, which chance makes once in sixty.
+const TREND: f64 = 0.93;
+const FEWEST_FOR_A_TREND: usize = 4;
+const FEWEST_IN_TURN: usize = 5;
+/// Degree of a drift in the number of the row.
+const DRIFT_DEGREE: i32 = 3;
 /// Two targets are one where they differ by less than this share of the travel: commands are written with few digits.
 const SAME_TARGET: f64 = 1e-7;
 
@@ -13,6 +26,8 @@ pub(crate) struct Approaches {
     pub sides: Vec<i8>,
     /// `[target][side][run]`.
     pub deviations: Vec<Vec<Vec<f64>>>,
+    /// The row of each, counted among those of the axis.
+    pub rows: Vec<Vec<Vec<usize>>>,
 }
 
 impl Approaches {
@@ -55,11 +70,13 @@ impl Approaches {
         }
         let sides: Vec<i8> = [1, -1].into_iter().filter(|one| side.contains(one)).collect();
         let mut deviations = vec![vec![Vec::new(); sides.len()]; targets.len()];
-        for ((at, side), deviation) in given.iter().zip(&side).zip(deviation) {
+        let mut rows = vec![vec![Vec::new(); sides.len()]; targets.len()];
+        for (row, ((at, side), deviation)) in given.iter().zip(&side).zip(deviation).enumerate() {
             let nearest = targets.partition_point(|target| *target < at - 0.5 * SAME_TARGET * travel);
             let place = nearest.min(targets.len() - 1);
             let column = sides.iter().position(|one| one == side).unwrap_or(0);
             deviations[place][column].push(*deviation);
+            rows[place][column].push(row);
         }
         for (target, of_target) in targets.iter().zip(&deviations) {
             for (side, runs) in sides.iter().zip(of_target) {
@@ -75,12 +92,39 @@ impl Approaches {
                 }
             }
         }
-        Ok(Self { targets, sides, deviations })
+        Ok(Self { targets, sides, deviations, rows })
     }
 
     /// Fewest approaches of a target from a side.
     pub(crate) fn fewest_runs(&self) -> usize {
         self.deviations.iter().flatten().map(Vec::len).min().unwrap_or(0)
+    }
+
+    /// The same less what changes alike at all targets with the number of the row, but for its mean: a polynomial, by what each target and side shows of
+    /// it from run to run.
+    pub(crate) fn without_drift(&self) -> Self {
+        let count = self.rows.iter().flatten().map(Vec::len).sum::<usize>();
+        let time = |row: usize| 2.0 * row as f64 / count as f64 - 1.0;
+        let cells = || self.rows.iter().flatten().zip(self.deviations.iter().flatten());
+        let centred = |of: &dyn Fn(usize, f64) -> f64| -> Vec<f64> {
+            let cell = |(rows, deviations): (&Vec<usize>, &Vec<f64>)| {
+                let values: Vec<f64> = rows.iter().zip(deviations).map(|(row, one)| of(*row, *one)).collect();
+                let middle = mean(&values);
+                values.into_iter().map(move |value| value - middle).collect::<Vec<f64>>()
+            };
+            cells().flat_map(cell).collect()
+        };
+        let powers = Basis::of((1..=DRIFT_DEGREE).map(|power| centred(&|row, _| time(row).powi(power))).collect());
+        let found = centred(&|_, deviation| deviation);
+        let size: Vec<f64> = powers.weights().iter().map(|weights| dot(weights, &found)).collect();
+        let drift =
+            |row: usize| (1..=DRIFT_DEGREE).zip(&size).map(|(power, size)| size * time(row).powi(power)).sum::<f64>();
+        let middle = (0..count).map(drift).sum::<f64>() / count as f64;
+        let mut without = self.deviations.clone();
+        for (deviation, row) in without.iter_mut().flatten().flatten().zip(self.rows.iter().flatten().flatten()) {
+            *deviation -= drift(*row) - middle;
+        }
+        Self { targets: self.targets.clone(), sides: self.sides.clone(), deviations: without, rows: self.rows.clone() }
     }
 
     /// What changes from run to run.
@@ -91,23 +135,34 @@ impl Approaches {
         let middle = mean(&along);
         let along: Vec<f64> = along.iter().map(|place| place - middle).collect();
         let sides = self.sides.len();
-        let cells = (self.targets.len() * sides) as f64;
-        let squares_along = along.iter().map(|place| place * place).sum::<f64>() * sides as f64;
-        let (mut common, mut slope, mut own) = (Vec::new(), 0.0, 0.0);
+        let cells = self.targets.len() * sides;
+        let squares_along = along.iter().map(|place| place * place).sum::<f64>();
+        let (mut course, mut own) = (Vec::new(), 0.0);
+        // Squares of what both sides of a run have in common, and of half of what they are apart by: level and tilt.
+        let (mut common, mut apart) = ([0.0; 2], [0.0; 2]);
         for run in 0..runs {
-            let left = |place: usize, side: usize| {
-                let cell = &self.deviations[place][side];
-                cell[run] - mean(&cell[..runs])
+            let of_side = |side: usize| {
+                let left = |place: usize| {
+                    let cell = &self.deviations[place][side];
+                    cell[run] - mean(&cell[..runs])
+                };
+                let level = (0..along.len()).map(left).sum::<f64>() / along.len() as f64;
+                let tilt = (0..along.len()).map(|place| along[place] * left(place)).sum::<f64>() / squares_along;
+                let squares =
+                    (0..along.len()).map(|place| (left(place) - level - tilt * along[place]).powi(2)).sum::<f64>();
+                ([level, tilt], squares)
             };
-            let each = || (0..along.len()).flat_map(|place| (0..sides).map(move |side| (place, side)));
-            let level = each().map(|(place, side)| left(place, side)).sum::<f64>() / cells;
-            let tilt = each().map(|(place, side)| along[place] * left(place, side)).sum::<f64>() / squares_along;
-            own += each().map(|(place, side)| (left(place, side) - level - tilt * along[place]).powi(2)).sum::<f64>();
-            slope += tilt * tilt;
-            common.push(level);
+            let each: Vec<([f64; 2], f64)> = (0..sides).map(of_side).collect();
+            own += each.iter().map(|(_, squares)| squares).sum::<f64>();
+            let [first, last] = [each[0].0, each[sides - 1].0];
+            for part in 0..2 {
+                common[part] += (0.5 * (first[part] + last[part])).powi(2);
+                apart[part] += (0.5 * (first[part] - last[part])).powi(2);
+            }
+            course.push(0.5 * (first[0] + last[0]));
         }
         let freedom = runs - 1;
-        let freedom_own = ((cells - 2.0) as usize).max(1) * freedom;
+        let freedom_own = (cells - 2 * sides).max(1) * freedom;
         let of_runs = |squares: f64| (squares / freedom as f64).sqrt();
         Noise {
             copies: self
@@ -115,10 +170,10 @@ impl Approaches {
                 .iter()
                 .flatten()
                 .all(|runs| runs.iter().all(|one| one.to_bits() == runs[0].to_bits())),
-            common_std: of_runs(common.iter().map(|level| level * level).sum()),
-            slope_std: of_runs(slope),
+            common: common.map(of_runs),
+            apart: apart.map(of_runs),
             own_std: (own / freedom_own as f64).sqrt(),
-            course: common,
+            course,
             along,
             runs,
             freedom_own,
@@ -126,13 +181,15 @@ impl Approaches {
     }
 }
 
-/// What changes from run to run: by one deviation at all targets, by one that grows along the travel, and at each target by itself.
+/// What changes from run to run: at all targets alike, by what grows along the travel, both for the two sides together and against each other, and at
+/// each target by itself.
 pub(crate) struct Noise {
     /// Deviation of each run at all targets, from the mean of the runs.
     pub course: Vec<f64>,
-    pub common_std: f64,
-    /// At the ends of the travel.
-    pub slope_std: f64,
+    /// Standard deviations of a run at all targets, and of what grows along the travel to its ends: of the mean of both sides.
+    pub common: [f64; 2],
+    /// The same of half of what the sides are apart by.
+    pub apart: [f64; 2],
     pub own_std: f64,
     /// Places along the travel: two apart at its ends, 0 on average.
     pub along: Vec<f64>,
@@ -142,9 +199,30 @@ pub(crate) struct Noise {
     pub copies: bool,
 }
 
+/// What runs do as a whole, at all targets alike.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Runs {
+    Alike,
+    Differ,
+    Drift,
+}
+
 impl Noise {
+    /// What the runs do as a whole, each the mean of so many approaches.
+    pub(crate) fn of_whole_runs(&self, approaches: usize) -> Runs {
+        let std = self.own_std / (approaches as f64).sqrt();
+        if !(self.common[0] > OFF * std && std > 0.0) {
+            return Runs::Alike;
+        }
+        let steps = || self.course.windows(2).map(|pair| pair[1] - pair[0]);
+        let in_turn = steps().all(|step| step > 0.0) || steps().all(|step| step < 0.0);
+        let drifts =
+            (self.runs >= FEWEST_FOR_A_TREND && self.trend().abs() > TREND) || (self.runs >= FEWEST_IN_TURN && in_turn);
+        if drifts { Runs::Drift } else { Runs::Differ }
+    }
+
     /// Correlation of the runs' deviations with their number.
-    pub(crate) fn trend(&self) -> f64 {
+    fn trend(&self) -> f64 {
         let middle = 0.5 * (self.runs as f64 - 1.0);
         let each = || self.course.iter().enumerate().map(|(run, level)| (run as f64 - middle, level));
         let along: f64 = each().map(|(run, level)| run * level).sum();

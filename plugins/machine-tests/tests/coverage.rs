@@ -36,11 +36,12 @@ fn number(outcome: &Outcome, symbol: &str) -> (f64, f64, [f64; 2]) {
     (value.value, value.std().unwrap(), value.interval_95().unwrap())
 }
 
-/// A machine: mean deviation at a target and side, noise of an approach, and what a run is off by as a whole.
+/// A machine: mean deviation at a target and side, noise of an approach, and what a run is off by as a whole, and what it is off by from one side.
 #[allow(clippy::struct_field_names, reason = "all are in µm")]
 struct Axis {
     noise_um: f64,
     of_run_um: f64,
+    of_side_um: f64,
     backlash_um: f64,
 }
 
@@ -52,13 +53,26 @@ impl Axis {
     }
 
     fn measured(&self, chance: &mut Chance, targets_mm: &[f64], runs: usize) -> Outcome {
+        self.measured_beside(chance, targets_mm, runs, |_| 0.0)
+    }
+
+    /// The same beside what changes with the number of the approach.
+    fn measured_beside(
+        &self,
+        chance: &mut Chance,
+        targets_mm: &[f64],
+        runs: usize,
+        drift_um: impl Fn(f64) -> f64,
+    ) -> Outcome {
         let mut columns = [("target_mm", Vec::new()), ("deviation_um", Vec::new())];
         for _ in 0..runs {
-            let off = self.of_run_um * chance.normal();
+            let of_run_um = self.of_run_um * chance.normal();
             for (side, order) in [(1.0, targets_mm.to_vec()), (-1.0, targets_mm.iter().rev().copied().collect())] {
+                let off = of_run_um + self.of_side_um * chance.normal();
                 for target in order {
+                    let drift_um = drift_um(columns[0].1.len() as f64);
                     columns[0].1.push(target);
-                    columns[1].1.push(self.mean_um(target, side) + off + self.noise_um * chance.normal());
+                    columns[1].1.push(self.mean_um(target, side) + off + drift_um + self.noise_um * chance.normal());
                 }
             }
         }
@@ -67,7 +81,7 @@ impl Axis {
     }
 
     fn truth_um(&self, targets_mm: &[f64], symbol: &str) -> f64 {
-        let spread = self.noise_um.hypot(self.of_run_um);
+        let spread = self.noise_um.hypot(self.of_run_um).hypot(self.of_side_um);
         let [ahead, behind] =
             [1.0, -1.0].map(|side| targets_mm.iter().map(|target| self.mean_um(*target, side)).collect::<Vec<_>>());
         let range = |values: &[f64]| {
@@ -91,8 +105,10 @@ fn intervals_of_positioning_hold_the_truth() {
     let trials = crate::trials::trials(100) as u32;
     let mut worst = f64::INFINITY;
     for runs in [2, 5, 10] {
-        for (noise_um, of_run_um) in [(0.05, 0.0), (0.5, 0.0), (0.2, 0.5), (2.0, 0.0)] {
-            let axis = Axis { noise_um, of_run_um, backlash_um: 1.0 };
+        for (noise_um, of_run_um, of_side_um) in
+            [(0.05, 0.0, 0.0), (0.5, 0.0, 0.0), (0.2, 0.5, 0.0), (0.2, 0.0, 0.5), (2.0, 0.0, 0.0)]
+        {
+            let axis = Axis { noise_um, of_run_um, of_side_um, backlash_um: 1.0 };
             let mut chance = Chance(ChaCha8Rng::seed_from_u64(runs as u64));
             let symbols = ["E", "A", "B", "M", "R"];
             let mut held = [0_usize; 5];
@@ -109,12 +125,55 @@ fn intervals_of_positioning_hold_the_truth() {
                 .map(|(symbol, held)| format!("{symbol} {:.0} %", 100.0 * held as f64 / f64::from(trials)))
                 .collect();
             worst = held.iter().map(|held| *held as f64 / f64::from(trials)).fold(worst, f64::min);
-            println!("{runs} runs, noise {noise_um} µm, of a run {of_run_um} µm: {}", shares.join(", "));
+            println!(
+                "{runs} runs, noise {noise_um} µm, of a run {of_run_um} µm, from a side {of_side_um} µm: {}",
+                shares.join(", ")
+            );
         }
     }
     // Of few runs some hold 90 %.
     let least = fewest(trials as usize, [80, 100], 0.9) as f64 / f64::from(trials);
     assert!(worst >= least, "{worst}");
+}
+
+/// An axis that warms up brings a part of it into the reversal value, which by its definition has none: its interval contains that.
+#[test]
+fn a_warm_up_is_in_the_interval_of_the_reversal_value() {
+    let targets: Vec<f64> = (0..11).map(|index| 50.0 * f64::from(index)).collect();
+    let trials = crate::trials::trials(60) as u32;
+    let counted = |[of_run_um, of_side_um]: [f64; 2], drift_um: &dyn Fn(f64) -> f64| {
+        let axis = Axis { noise_um: 0.3, of_run_um, of_side_um, backlash_um: 1.5 };
+        let mut chance = Chance(ChaCha8Rng::seed_from_u64(7));
+        let truth_um = targets
+            .iter()
+            .map(|target| (axis.mean_um(*target, 1.0) - axis.mean_um(*target, -1.0)) / targets.len() as f64)
+            .sum::<f64>();
+        let (mut held, mut said, mut refuted) = (0, 0, 0);
+        for _ in 0..trials {
+            let found = axis.measured_beside(&mut chance, &targets, 5, drift_um);
+            let (_, _, [low, high]) = number(&found, "B_mean");
+            held += u32::from((low..=high).contains(&truth_um));
+            said += u32::from(found.checks.iter().any(|check| check.finding.contains("without it, B_mean would be")));
+            refuted += u32::from(found.values.iter().any(|value| value.refuted_by.is_some()));
+        }
+        [held, said, refuted]
+    };
+    let warm = counted([0.0, 0.0], &|row| 4.0 * (1.0 - (-row / 25.0).exp()));
+    let less = counted([0.0, 0.0], &|row| 2.0 * (1.0 - (-row / 25.0).exp()));
+    // All runs drift alike, which their scatter does not show.
+    let steady = counted([0.0, 0.0], &|row| 0.025 * row);
+    let cases = [[0.0, 0.0], [0.5, 0.0], [0.0, 0.5]].map(|off| counted(off, &|_| 0.0));
+    println!(
+        "B_mean held, said to drift, and anything contradicted, of {trials}: warm-up {warm:?} and {less:?}; steadily {steady:?}; sound {cases:?}"
+    );
+    let least = fewest(trials as usize, [54, 60], 0.9) as u32;
+    assert!(
+        warm[0] >= least && less[0] >= least && steady[0] >= least && steady[1] >= trials / 4,
+        "{warm:?} {less:?} {steady:?}"
+    );
+    for [held, said, refuted] in cases {
+        assert!(held >= least && said <= 1 + trials / 10 && refuted <= 1 + trials / 20, "{cases:?}");
+    }
 }
 
 #[test]
@@ -245,7 +304,7 @@ fn turns_that_drift_are_said() {
 fn scatter_that_grows_along_the_travel_is_said() {
     let mut chance = Chance(ChaCha8Rng::seed_from_u64(23));
     let targets_mm: Vec<f64> = (0..11).map(|target| 50.0 * f64::from(target)).collect();
-    let axis = Axis { noise_um: 0.0, of_run_um: 0.3, backlash_um: 1.0 };
+    let axis = Axis { noise_um: 0.0, of_run_um: 0.3, of_side_um: 0.0, backlash_um: 1.0 };
     let mut said = |grows: f64| {
         let mut one = || {
             let mut columns = [("target_mm", Vec::new()), ("deviation_um", Vec::new()), ("direction", Vec::new())];

@@ -231,6 +231,19 @@ fn what_is_odd_is_said() {
     let found = of(Object::Sphere, &copies);
     assert!(found.values[0].uncertainty.is_none());
     assert!(found.remarks.iter().any(|remark| remark.contains("copies show no uncertainty")), "{:?}", found.remarks);
+    // One side that is noisier than the others, one set in µm, touches on a cap alone.
+    let (mut loud, mut chance) = (usual.clone(), Chance::new(6));
+    for (row, _) in on_sphere().iter().cycle().take(100).enumerate().filter(|(_, place)| place[0] > 0.7) {
+        loud.numbers[0][row] += 4e-3 * chance.normal();
+    }
+    assert!(refuted(&of(Object::Sphere, &loud), "the side +x has"), "{:?}", of(Object::Sphere, &loud).checks);
+    let mut in_um = usual.clone();
+    in_um.numbers[..3].iter_mut().for_each(|column| column[75..].iter_mut().for_each(|at| *at *= 1e3));
+    assert!(refuted(&of(Object::Sphere, &in_um), "set 4 are"), "{:?}", of(Object::Sphere, &in_um).checks);
+    let mut cap = usual.clone();
+    cap.numbers.iter_mut().for_each(|column| *column = column.chunks(25).flat_map(|set| set[..12].to_vec()).collect());
+    cap.texts.truncate(48);
+    assert!(of(Object::Sphere, &cap).remarks.iter().any(|remark| remark.contains("on a cap of the sphere")));
     // A disturbance that lasts for several touches.
     let mut slow = usual.clone();
     let (mut last, mut chance) = (0.0, Chance::new(5));

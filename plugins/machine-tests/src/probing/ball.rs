@@ -1,6 +1,8 @@
 //! Sets of touches of a sphere or a ring: the centre of each by least squares, and the radial deviations from it.
 
-use runout_core::{Error, ErrorKind, Result, numerics::least_squares::Basis, points::Points};
+use runout_core::{
+    Error, ErrorKind, Result, consistency::groups::Group, numerics::least_squares::Basis, points::Points,
+};
 
 /// Steps of a fit, and the share of the radius below which one is its last.
 const STEPS: usize = 60;
@@ -100,6 +102,14 @@ pub(crate) fn range(values: &[f64]) -> f64 {
 }
 
 impl Touches {
+    /// Length of the mean of the directions of the first set: 0 all around, 0.64 of half a ring, 0.5 of half a sphere, 1 at one place.
+    pub(super) fn lopsidedness(&self) -> f64 {
+        let directions = &self.sets[0].directions;
+        let axes = directions.first().map_or(0, Vec::len);
+        let mean = |axis: usize| directions.iter().map(|to| to[axis]).sum::<f64>() / directions.len() as f64;
+        (0..axes).map(|axis| mean(axis).powi(2)).sum::<f64>().sqrt()
+    }
+
     /// Of points, by the column `repeat`.
     pub(super) fn of(points: &Points, axes: &[&str]) -> Result<Self> {
         let columns = axes.iter().map(|name| points.column(name)).collect::<Result<Vec<_>>>()?;
@@ -161,6 +171,25 @@ impl Touches {
             .iter()
             .map(|set| set.deviations_um.iter().zip(&means).map(|(one, mean)| one - mean).collect())
             .collect()
+    }
+
+    /// Its squares by the direction, along an axis, that touches are nearest to.
+    pub(super) fn sides(&self) -> Vec<Group> {
+        let directions = &self.sets[0].directions;
+        let of_touch = self.freedom() as f64 / directions.len() as f64;
+        let noise = self.noise_um();
+        let mut sides: Vec<Group> = Vec::new();
+        for (touch, to) in directions.iter().enumerate() {
+            let nearest = to.iter().zip(["x", "y", "z"]).max_by(|a, b| a.0.abs().total_cmp(&b.0.abs()));
+            let Some((along, axis)) = nearest else { continue };
+            let name = format!("the side {}{axis}", if *along < 0.0 { '-' } else { '+' });
+            let squares: f64 = noise.iter().map(|set| set[touch] * set[touch]).sum();
+            match sides.iter_mut().find(|side| side.name == name) {
+                Some(side) => (side.squares, side.freedom) = (side.squares + squares, side.freedom + of_touch),
+                None => sides.push(Group { name, squares, freedom: of_touch }),
+            }
+        }
+        sides
     }
 
     /// Degrees of freedom of it.
