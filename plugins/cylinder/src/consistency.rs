@@ -1,15 +1,25 @@
 //! The tests of measured circles on their own points.
 
+use std::f64::consts::TAU;
+
 use runout_core::{
-    consistency::{Check, Kind, Structure, rows},
-    numerics::least_squares::Basis,
+    consistency::{Check, Kind, Structure, Test, rows},
+    numerics::{least_squares::Basis, number::significant, statistics::f_tail},
 };
 
 use crate::{
     circle::Harmonics,
     robust::{ROUNDING_UM, rms},
-    scan::Scan,
+    scan::{Scan, unwrapped},
 };
+
+/// Points on either side of a place through which lines are laid, and the fewest points of a circle that is judged by them.
+const BESIDE: usize = 5;
+const FEWEST: usize = 40;
+/// Shares of a turn between which a trace goes round once.
+const ONCE: [f64; 2] = [0.97, 1.03];
+/// So many times its largest step elsewhere a circle has where it does not close: an edge is no drift.
+const UNLIKE: f64 = 1.5;
 
 /// What is declared of circles of these names: errors may depend on each other along the angle; circles are independent, have the same noise
 /// and may be offset.
@@ -33,15 +43,101 @@ pub(crate) fn structure(scans: &[Scan], names: &[String]) -> Structure {
 }
 
 impl Harmonics {
-    /// Names points of a circle that are not like the others about them.
-    pub(crate) fn unlike(&self, scan: &Scan, name: &str) -> Option<Check> {
+    /// Names points of a circle that are not like the others about them: `scan` about the axis, at its angles as measured.
+    pub(crate) fn unlike(&self, scan: &Scan, measured: &Scan, name: &str) -> Option<Check> {
         let basis = Basis::of(self.columns(scan));
         let mut left = scan.deviation_um.clone();
         basis.remove_from(&mut left);
         if rms(left.iter().copied()) < ROUNDING_UM {
             return None;
         }
-        let declared = structure(std::slice::from_ref(scan), &[name.to_owned()]);
+        let declared = structure(std::slice::from_ref(measured), &[name.to_owned()]);
         Some(rows::unlike(&left, basis.columns())?.check(&declared, "µm"))
+    }
+}
+
+/// Whether a circle of one turn ends where it began: lines through the points before and behind its beginning have to meet there as those at all
+/// other places do. What drifts over the turn makes a step of it. `None` of other traces and of few points.
+pub(crate) fn closes(scan: &Scan, name: &str) -> Option<Check> {
+    let turned = unwrapped(&scan.angle_rad);
+    let count = turned.len();
+    let last = *turned.last()?;
+    let turn = last.abs() * count as f64 / (count.max(2) - 1) as f64 / TAU;
+    if count < FEWEST || !(ONCE[0]..ONCE[1]).contains(&turn) {
+        return None;
+    }
+    let at = |place: usize| {
+        (
+            turned[place % count] + if place < count { 0.0 } else { last.signum() * TAU },
+            scan.deviation_um[place % count],
+        )
+    };
+    let step = |place: usize| {
+        let between = 0.5 * (at(place - 1).0 + at(place).0);
+        let level = |points: std::ops::Range<usize>| {
+            let [angle, height] = points.clone().map(at).fold([0.0; 2], |[x, y], (a, b)| [x + a, y + b]);
+            let [angle, height] = [angle, height].map(|sum| sum / BESIDE as f64);
+            let (across, along) = points.map(at).fold((0.0, 0.0), |(across, along), (a, b)| {
+                (across + (a - angle) * (b - height), along + (a - angle).powi(2))
+            });
+            height + across / along * (between - angle)
+        };
+        level(place..place + BESIDE) - level(place - BESIDE..place)
+    };
+    // From behind the lines at the beginning to before those at the end.
+    let elsewhere: Vec<f64> = (2 * BESIDE..=count - BESIDE - BESIDE).map(step).collect();
+    let square = elsewhere.iter().map(|step| step * step).sum::<f64>() / elsewhere.len() as f64;
+    let largest = elsewhere.iter().fold(0.0_f64, |largest, step| largest.max(step.abs()));
+    let own = step(count);
+    // Steps whose lines share points depend on each other.
+    let independent = elsewhere.len() as f64 / (2 * BESIDE) as f64;
+    let ratio = own * own / square.max(f64::MIN_POSITIVE);
+    let p = if own.abs() > UNLIKE * largest { f_tail(ratio, 1.0, independent) } else { 1.0 };
+    Some(Check::new(Test::Order, format!("closure of {name}"), ratio, &[1.0, independent], p).finding(|| {
+        let [own, largest] = [own.abs(), largest].map(|step| significant(step, 2));
+        format!("{name} does not close: its end and its beginning are apart by {own} µm, and neighbours elsewhere by {largest} µm at most. Something drifts over the turn, or the part has an edge there")
+    }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A circle of `count` points from 30° on, with waves, noise of 0.05 µm and a drift over the turn.
+    fn circle(seed: u64, count: usize, drift_um: f64) -> Scan {
+        let mut state = seed;
+        let mut uniform = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+        };
+        let mut scan = Scan::default();
+        for point in 0..count {
+            let share = point as f64 / count as f64;
+            let angle = TAU * share + 0.52;
+            let noise: f64 = 0.05 * (0..12).map(|_| uniform()).sum::<f64>();
+            let wave = 2.0 * (2.0 * angle + 0.3).cos() + 0.4 * (7.0 * angle).sin() + 0.1 * (31.0 * angle).cos();
+            scan.push(angle.rem_euclid(TAU), 0.0, wave + noise + drift_um * share);
+        }
+        scan
+    }
+
+    #[test]
+    fn a_drift_over_a_turn_is_seen_where_the_circle_closes() {
+        let said = |drift_um: f64, count: usize| {
+            (0..200)
+                .filter(|seed| closes(&circle(*seed, count, drift_um), "circle").is_some_and(|check| check.refutes()))
+                .count()
+        };
+        assert!(said(0.0, 360) <= 2 && said(0.0, 72) <= 2, "{} {}", said(0.0, 360), said(0.0, 72));
+        assert!(said(1.0, 360) > 190, "{}", said(1.0, 360));
+        // Clockwise; an edge elsewhere is larger; half a turn and two turns do not close.
+        let mut back = circle(1, 360, 2.0);
+        back.angle_rad.iter_mut().for_each(|angle| *angle = -*angle);
+        assert!(closes(&back, "circle").is_some_and(|check| check.finding.contains("does not close")));
+        let mut edge = circle(1, 360, 1.0);
+        edge.deviation_um[100..].iter_mut().for_each(|deviation| *deviation += 3.0);
+        assert!(closes(&edge, "circle").is_some_and(|check| !check.refutes()));
+        let half = circle(1, 720, 2.0).keep(&(0..720).map(|point| point < 360).collect::<Vec<bool>>());
+        assert!(closes(&half, "circle").is_none());
     }
 }

@@ -109,7 +109,7 @@ impl<'a> Basis<'a> {
         let mut defects = Vec::new();
         // Where outliers are asked for to be left out, they are.
         for circle in circles.iter_mut().filter(|_| separator.outlier_mad().is_none()) {
-            let (scan, found) = set_aside(&circle.scan, &format!("{} {}", circle.kind, circle.id));
+            let (scan, found) = set_aside(&circle.scan, &circle.name());
             circle.scan = scan;
             defects.extend(found);
         }
@@ -154,7 +154,7 @@ impl<'a> Basis<'a> {
     }
 
     fn names(&self) -> Vec<String> {
-        self.circles.iter().map(|circle| format!("{} {}", circle.kind, circle.id)).collect()
+        self.circles.iter().map(Circle::name).collect()
     }
 }
 

@@ -147,7 +147,7 @@ impl Helix {
 }
 
 /// Angles from the first one on, without jumps of a turn.
-fn unwrapped(angle_rad: &[f64]) -> Vec<f64> {
+pub(crate) fn unwrapped(angle_rad: &[f64]) -> Vec<f64> {
     let mut turned = 0.0;
     let steps = angle_rad.windows(2).map(|pair| (pair[1] - pair[0] + PI).rem_euclid(TAU) - PI);
     let steps = steps.map(|step| {

@@ -24,8 +24,8 @@ pub(crate) use circles::Circle;
 use circles::unseen;
 
 use crate::{
-    circle::Harmonics, config::LeastSquaresCylinderConfig, generatrix::open_profiles, predict::Prediction, robust::rms,
-    scan::Scan, shape::Cylinder,
+    circle::Harmonics, config::LeastSquaresCylinderConfig, consistency::closes, generatrix::open_profiles,
+    predict::Prediction, robust::rms, scan::Scan, shape::Cylinder,
 };
 
 impl StageConfig for LeastSquaresCylinderConfig {
@@ -208,8 +208,9 @@ impl LeastSquaresCylinder {
         }
         let fit = Harmonics::fit(&placed, self.0.max_order, None).map_err(unfit)?;
         let order = fit.max_order();
-        let named = format!("{} {}", circle.kind, circle.id);
-        let checks = fit.unlike(&placed, &named).into_iter().collect();
+        let named = circle.name();
+        let closes = if circle.window.is_none() { closes(&placed, &named) } else { None };
+        let checks = fit.unlike(&placed, &circle.scan, &named).into_iter().chain(closes).collect();
         circle.warnings.extend(fit.limit.iter().map(|limit| format!("{named}: {limit}")));
         for [from, to] in unseen(&placed, order).map(|ends| ends.map(f64::to_degrees)) {
             let gap = format!("no point is used between {from:.2}° and {to:.2}°: it is left out of every value");

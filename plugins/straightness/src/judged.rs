@@ -2,11 +2,26 @@
 
 use runout_core::{
     closed_loop::{Setting, tested::Tested},
-    consistency::{Check, Kind, LinearFit, Structure, Test, judge},
-    numerics::least_squares::Basis,
+    consistency::{Check, Kind, LinearFit, Structure, Test, check::FINDING, judge},
+    numerics::{least_squares::Basis, statistics::f_tail},
 };
 
-use crate::{contrasts::TraceErrors, model::TracesFit, trace::AxialTrace};
+use crate::{contrasts::TraceErrors, model::TracesFit, straightness::Straightness, trace::AxialTrace};
+
+/// Says that the setups, of these names, read the same: nothing shows the slide. `None` where something does, and where the noise is not known.
+pub(crate) fn not_reversed(found: &Straightness, [initial, reversed]: [&str; 2]) -> Option<String> {
+    let power = |values: &[f64]| values.iter().map(|value| value * value).sum::<f64>();
+    // Of each profile the line is taken out.
+    let places = found.slide_um.len() as f64 - 2.0;
+    let ratio = power(&found.slide_um) / power(&found.slide_std_um);
+    let below = found.degrees_of_freedom as f64 * places;
+    (found.degrees_of_freedom > 0 && f_tail(ratio, places, below) > FINDING).then(|| {
+        format!(
+            "the setups `{initial}` and `{reversed}` read the same within their noise: nothing shows a slide. If the part was not turned or the probe not \
+             reversed, or traces have the wrong sign, what is called part is part and slide together"
+        )
+    })
+}
 
 impl TracesFit {
     /// What the tests of contrasts and of traces say.

@@ -20,6 +20,7 @@ use serde::Deserialize;
 use crate::{
     contrasts::TraceErrors,
     grid::{Split, smooth},
+    judged::not_reversed,
     moves::{grid, rows},
     positions::{coarsest_mm, common_range, positions},
     straightness::{self, LIMIT, Straightness},
@@ -211,6 +212,7 @@ impl AxialReversal {
         }
         result.checks = fit.consistency();
         result.warnings.extend(said);
+        result.warnings.extend(not_reversed(&result, [&self.0.initial, &self.0.reversed]));
         finite(points, &result)?;
         Ok(result)
     }

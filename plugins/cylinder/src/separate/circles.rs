@@ -32,6 +32,11 @@ pub(crate) struct Circle<'a> {
 }
 
 impl Circle<'_> {
+    /// What messages call it.
+    pub(crate) fn name(&self) -> String {
+        if self.id == self.kind { self.id.clone() } else { format!("{} {}", self.kind, self.id) }
+    }
+
     /// Its place about an axis, and the arcs that harmonics up to an order only bridge. Circles at one height share it.
     pub(crate) fn section(&self, placed: &Scan, max_order: usize, cylinder: &Cylinder) -> SectionAt {
         let z_mm = if cylinder.tilted { placed.mean_z_mm() } else { cylinder.z_mm };
