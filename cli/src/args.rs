@@ -81,16 +81,23 @@ pub(crate) struct RunArgs {
     /// Stations worked on at a time; as many as there are processors without it.
     #[arg(long, value_name = "N", value_parser = threads)]
     pub threads: Option<NonZeroUsize>,
-    /// End with exit status 1 unless every value under a [[limit]] is proven to keep it: its 95 % interval lies within (ISO
-    /// 14253-1). A value without uncertainty, and a limit that names no value, prove nothing. Files and the summary are
-    /// written all the same. Without any [[limit]] that is a mistake (exit status 2).
-    #[arg(long)]
-    pub fail_on_limit: bool,
+    #[command(flatten)]
+    pub limits: LimitArgs,
     /// Print everything: turns and filters, all directions of motion, the surface, what the values are, notes, names of the files.
     #[arg(short, long)]
     pub verbose: bool,
     #[command(flatten)]
     pub warnings: WarningArgs,
+}
+
+/// Whether limits fail that are not proven to be kept.
+#[derive(Debug, Clone, Copy, Args)]
+pub(crate) struct LimitArgs {
+    /// End with exit status 1 unless every value under a [[limit]] is proven to keep it: its 95 % interval lies within (ISO
+    /// 14253-1). A value without uncertainty, and a limit that names no value, prove nothing. Files and the summary are
+    /// written all the same. Without any [[limit]] that is a mistake (exit status 2).
+    #[arg(long)]
+    pub fail_on_limit: bool,
 }
 
 /// Whether warnings fail.
@@ -117,6 +124,8 @@ pub(crate) struct BatchArgs {
     /// Recordings worked on at a time, each by one thread; as many as there are processors without it.
     #[arg(long, value_name = "N", value_parser = threads)]
     pub jobs: Option<NonZeroUsize>,
+    #[command(flatten)]
+    pub limits: LimitArgs,
     #[command(flatten)]
     pub warnings: WarningArgs,
     /// Folders of a recording's path that belong to its name, for files of the same name in different folders.

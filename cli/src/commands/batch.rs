@@ -12,13 +12,14 @@ use runout_core::{
 };
 use runout_parquet::DataSet;
 
-use super::{fail_on, print};
+use super::{fail_on, fail_on_limits, no_limit, print};
 use crate::{args::BatchArgs, failure::Failure, progress::Progress, render};
 
 /// Runs a pipeline on every recording that is not up to date, and says how the values of all of them run.
 ///
 /// # Errors
-/// When the command line or the configuration is wrong, or the data set cannot be written; after the report, when a recording failed.
+/// When the command line or the configuration is wrong, or the data set cannot be written; after the report, when a recording failed, and where it was
+/// asked for, when a limit is not proven to be kept or a warning was given.
 pub(crate) fn execute(args: &BatchArgs, json: bool, registry: &Registry) -> Result<(), Failure> {
     let sources = Sources::read(&args.pipeline.pipeline, &args.pipeline.overrides.set, INCLUDE_KEY)?;
     let recordings = recordings(&args.recordings, args.name_folders).map_err(|error| Failure::Name {
@@ -36,6 +37,11 @@ pub(crate) fn execute(args: &BatchArgs, json: bool, registry: &Registry) -> Resu
     if !report.failed.is_empty() {
         return Err(Failure::Several { failed: report.failed.len(), thing: "recording" });
     }
+    if args.limits.fail_on_limit && report.limits.is_empty() {
+        return Err(no_limit());
+    }
+    let open = report.limits.iter().filter(|limit| limit.does_not_conform + limit.undecided > 0);
+    fail_on_limits(open.map(|limit| limit.limit.name()), args.limits)?;
     // What is of another configuration is one warning.
     let outdated = usize::from(!report.other_configuration.is_empty());
     fail_on(report.warning_count + outdated, args.warnings)

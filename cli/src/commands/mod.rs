@@ -21,7 +21,7 @@ use runout_core::pipeline::{INCLUDE_KEY, Pipeline, Registry, document::Sources};
 use serde::Serialize;
 
 use crate::{
-    args::{Command, PipelineArgs, WarningArgs},
+    args::{Command, LimitArgs, PipelineArgs, WarningArgs},
     failure::Failure,
     render,
 };
@@ -55,6 +55,18 @@ fn pipeline(args: &PipelineArgs, registry: &Registry) -> Result<(Sources, Pipeli
     let sources = Sources::read(&args.pipeline, &args.overrides.set, INCLUDE_KEY)?;
     let pipeline = Pipeline::from_sources(&sources, registry)?;
     Ok((sources, pipeline))
+}
+
+/// Fails where limits are not proven to be kept, by their names, if that was asked for.
+fn fail_on_limits(open: impl Iterator<Item = String>, args: LimitArgs) -> Result<(), Failure> {
+    let open: Vec<String> = open.collect();
+    if args.fail_on_limit && !open.is_empty() { Err(Failure::Limit(open)) } else { Ok(()) }
+}
+
+/// What is wrong where limits are to decide and there is none.
+fn no_limit() -> Failure {
+    let message = "--fail-on-limit, and the pipeline has no limit".into();
+    Failure::Name { message, help: "add a table [[limit]], or leave --fail-on-limit out".into() }
 }
 
 /// Fails where there are warnings, if that was asked for.

@@ -29,6 +29,11 @@ struct Written {
 /// # Errors
 /// When the file is no result, or the report cannot be written.
 pub(crate) fn execute(args: &ReportArgs, json: bool) -> std::result::Result<(), Failure> {
+    if args.result.is_dir() || args.result.extension().is_some_and(|ending| ending == "json") {
+        let message = format!("{} is no result file", args.result.display());
+        let help = "name the file that `[[export]] plugin = \"hdf5\"` wrote; `plugin = \"report\"` writes the page of a run at once";
+        return Err(Failure::Name { message, help: help.into() });
+    }
     let report = args.out.clone().unwrap_or_else(|| args.result.with_extension("html"));
     if resolved(&report) == resolved(&args.result) {
         let message = format!("{} is the result itself", report.display());

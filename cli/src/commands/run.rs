@@ -5,7 +5,7 @@ use runout_core::{
     summary::Decision,
 };
 
-use super::{fail_on, pipeline, print};
+use super::{fail_on, fail_on_limits, no_limit, pipeline, print};
 use crate::{args::RunArgs, failure::Failure, progress::Progress, render};
 
 /// Runs a pipeline and says what came out.
@@ -15,20 +15,14 @@ use crate::{args::RunArgs, failure::Failure, progress::Progress, render};
 /// be kept or a warning was given.
 pub(crate) fn execute(args: &RunArgs, json: bool, registry: &Registry) -> Result<(), Failure> {
     let (_, pipeline) = pipeline(&args.pipeline, registry)?;
-    if args.fail_on_limit && pipeline.evaluate.limits().is_empty() {
-        let message = "--fail-on-limit, and the pipeline has no limit".into();
-        return Err(Failure::Name { message, help: "add a table [[limit]], or leave --fail-on-limit out".into() });
+    if args.limits.fail_on_limit && pipeline.evaluate.limits().is_empty() {
+        return Err(no_limit());
     }
     let progress = Progress::new("stations");
     let summary = run::run(&pipeline, args.threads, &progress)?;
     drop(progress);
     print(&summary, json, |summary| render::summary::text(summary, render::columns(), args.verbose))?;
-    let open: Vec<String> = (summary.limits.iter())
-        .filter(|limit| args.fail_on_limit && limit.decision != Decision::Conforms)
-        .map(|limit| limit.limit.name())
-        .collect();
-    if !open.is_empty() {
-        return Err(Failure::Limit(open));
-    }
+    let open = summary.limits.iter().filter(|limit| limit.decision != Decision::Conforms);
+    fail_on_limits(open.map(|limit| limit.limit.name()), args.limits)?;
     fail_on(summary.findings().count(), args.warnings)
 }

@@ -218,6 +218,18 @@ fn a_kill_at_any_step_leaves_no_summary_without_its_tables() {
 }
 
 #[test]
+fn a_batch_can_fail_on_a_limit() {
+    let folder = recorded(&["a.h5"]);
+    let limit =
+        |upper: &str| format!("limit=[{{ symbol = \"RONt\", upper = {upper}, unit = \"um\", filter = \"none\" }}]");
+    let ran = |out: &str, more: &[&str]| batch(&folder, out, &["a.h5"], &[&["--fail-on-limit"], more].concat());
+    assert_eq!(ran("kept", &["--set", &limit("500")]).0, 0);
+    let (status, report, stderr) = ran("broken", &["--set", &limit("1e-3")]);
+    assert_eq!((status, &report["limits"][0]["does_not_conform"]), (1, &Value::from(1)), "{stderr}");
+    assert_eq!(ran("none", &[]).0, 2);
+}
+
+#[test]
 fn what_cannot_be_distinguished_is_refused_before_the_work() {
     let folder = recorded(&["a.h5"]);
     fs::create_dir(folder.path().join("other")).unwrap();

@@ -241,6 +241,7 @@ fn what_is_no_result_is_refused() {
         (&["report", "shaft.h5"][..], 1, "expected a file of the format runout-result"),
         (&["report", "none.h5"], 1, "none.h5"),
         (&["report", "scenario.toml"], 1, "no HDF5 file"),
+        (&["report", "."], 2, "is no result file"),
         (&["report", "shaft.h5", "--out", "./shaft.h5"], 2, "is the result itself"),
     ] {
         let ran = folder.run(arguments);
