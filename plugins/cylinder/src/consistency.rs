@@ -95,7 +95,7 @@ pub(crate) fn closes(scan: &Scan, name: &str) -> Option<Check> {
     let p = if own.abs() > UNLIKE * largest { f_tail(ratio, 1.0, independent) } else { 1.0 };
     Some(Check::new(Test::Order, format!("closure of {name}"), ratio, &[1.0, independent], p).finding(|| {
         let [own, largest] = [own.abs(), largest].map(|step| significant(step, 2));
-        format!("{name} does not close: its end and its beginning are apart by {own} µm, and neighbours elsewhere by {largest} µm at most. Something drifts over the turn, or the part has an edge there")
+        format!("it does not close: its end and its beginning are apart by {own} µm, and neighbours elsewhere by {largest} µm at most. Something drifts over the turn, or the part has an edge there")
     }))
 }
 

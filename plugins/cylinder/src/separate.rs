@@ -210,7 +210,7 @@ impl LeastSquaresCylinder {
         let order = fit.max_order();
         let named = circle.name();
         let closes = if circle.window.is_none() { closes(&placed, &named) } else { None };
-        let checks = fit.unlike(&placed, &circle.scan, &named).into_iter().chain(closes).collect();
+        let checks = fit.unlike(&placed, &circle.scan, "the point").into_iter().chain(closes).collect();
         circle.warnings.extend(fit.limit.iter().map(|limit| format!("{named}: {limit}")));
         for [from, to] in unseen(&placed, order).map(|ends| ends.map(f64::to_degrees)) {
             let gap = format!("no point is used between {from:.2}° and {to:.2}°: it is left out of every value");
