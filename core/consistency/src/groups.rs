@@ -51,6 +51,10 @@ pub struct Compared {
 pub fn compared(groups: &[Group], level: Level) -> Vec<Compared> {
     let judged: Vec<(usize, &Group)> =
         groups.iter().enumerate().filter(|(_, group)| group.freedom > LEAST_FREEDOM).collect();
+    // A group alone has no others.
+    if level == Level::Others && judged.len() < 2 {
+        return Vec::new();
+    }
     let (squares, freedom) = judged
         .iter()
         .fold((0.0, 0.0), |(squares, freedom), (_, group)| (squares + group.squares, freedom + group.freedom));
@@ -169,6 +173,8 @@ mod tests {
     #[test]
     fn groups_without_freedom_are_left_out() {
         let none = Group { name: "none".into(), squares: 1.0, freedom: 0.0 };
-        assert!(alike("parts", &[none.clone(), none], Level::Others, "").is_empty());
+        assert!(alike("parts", &[none.clone(), none.clone()], Level::Others, "").is_empty());
+        let one = Group { name: "one".into(), squares: 1.0, freedom: 3.0 };
+        assert!(alike("parts", &[none, one], Level::Others, "").is_empty());
     }
 }

@@ -4,7 +4,7 @@
 
 use std::{fs, path::Path};
 
-use crate::support::{python, registry};
+use crate::support::{MULTI_STEP_RIG, python, registry};
 use runout_core::{pipeline::Pipeline, summary::Summary};
 
 /// Reads profiles of S1 to S3, and divides those of S2 by 1/(1 − i n/12) where `undo` is set.
@@ -43,15 +43,11 @@ while line := source.readline():
     sys.stdout.buffer.flush()
 "#;
 
-const RIG: &str = r#"{ part_radius_mm = 30, sensors = [{ id = "S1", angle_deg = 0, z_mm = 100 },
-    { id = "S2", angle_deg = 99.844, z_mm = 100 }, { id = "S3", angle_deg = 202.5, z_mm = 100 }],
-    setups = [{ id = "a" }, { id = "b", part_deg = 99.844 }, { id = "c", part_deg = 202.5 }] }"#;
-
 const AVERAGE: &str = "[[preprocess]]\nplugin = \"synchronous-average\"\nsamples_per_rev = 128\n";
 
 fn pipeline(folder: &Path, effect: &str, preprocess: &str) -> std::result::Result<Pipeline, String> {
     let text = format!(
-        "rig = {RIG}\n[load]\nplugin = \"simulated\"\nseed = 9\nrig = {RIG}\n{effect}\n{preprocess}\n\
+        "rig = {MULTI_STEP_RIG}\n[load]\nplugin = \"simulated\"\nseed = 9\nrig = {MULTI_STEP_RIG}\n{effect}\n{preprocess}\n\
          [separate]\nplugin = \"harmonic-least-squares\"\n[[export]]\nplugin = \"parquet\"\npath = \"out\"\n"
     );
     Pipeline::from_toml(&text, folder, &registry()).map_err(|error| error.to_string())

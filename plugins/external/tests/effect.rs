@@ -4,7 +4,7 @@
 
 use std::{fs, path::Path, time::Instant};
 
-use crate::support::{python, registry};
+use crate::support::{MULTI_STEP_RIG, python, registry};
 use runout_core::{
     Result,
     pipeline::{Pipeline, diagnose::diagnose, run::Silent},
@@ -34,14 +34,10 @@ while line := source.readline():
     sys.stdout.buffer.flush()
 "#;
 
-const RIG: &str = r#"{ part_radius_mm = 30, sensors = [{ id = "S1", angle_deg = 0, z_mm = 100 },
-    { id = "S2", angle_deg = 99.844, z_mm = 100 }, { id = "S3", angle_deg = 202.5, z_mm = 100 }],
-    setups = [{ id = "a" }, { id = "b", part_deg = 99.844 }, { id = "c", part_deg = 202.5 }] }"#;
-
 /// A pipeline on a recording with a low-pass at 100 Hz, order 12 at 500 rpm, in S2.
 fn pipeline(folder: &Path, python: &str, effects: &str, more: &str) -> std::result::Result<Pipeline, String> {
     let text = format!(
-        "rig = {RIG}\n[load]\nplugin = \"simulated\"\nseed = 9\nrig = {RIG}\n\
+        "rig = {MULTI_STEP_RIG}\n[load]\nplugin = \"simulated\"\nseed = 9\nrig = {MULTI_STEP_RIG}\n\
          effect = [{{ plugin = \"filter-attenuation\", targets = [\"S2\"], cutoff_hz = 100 }}]\n\
          [[preprocess]]\nplugin = \"synchronous-average\"\nsamples_per_rev = 128\n\
          [separate]\nplugin = \"harmonic-least-squares\"\n[diagnose]\neffects = {effects}\n\
@@ -154,7 +150,7 @@ fn a_run_leaves_it_alone_and_keys_are_checked() {
     pipeline.run().unwrap();
     let refused = |from: &str, to: &str| {
         let text = format!(
-            "rig = {RIG}\nload = {{ plugin = \"simulated\", seed = 9, rig = {RIG} }}\nseparate = {{ plugin = \"harmonic-least-squares\" }}\n\
+            "rig = {MULTI_STEP_RIG}\nload = {{ plugin = \"simulated\", seed = 9, rig = {MULTI_STEP_RIG} }}\nseparate = {{ plugin = \"harmonic-least-squares\" }}\n\
              preprocess = [{{ plugin = \"synchronous-average\", samples_per_rev = 128 }}]\n\
              effect = [{{ plugin = \"external\", id = \"own\", command = [\"a\"], parameters = [{{ name = \"p\", unit = \"1\", usual = 1 }}] }}]\n"
         );

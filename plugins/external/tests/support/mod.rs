@@ -18,6 +18,11 @@ use runout_spindle::simulate::{Effect, SpindleConfig, SpindleSimulator, simulato
 use schemars::JsonSchema;
 use serde::Deserialize;
 
+/// Three sensors around one section and three angles of the part, which determine more than is wanted.
+pub(crate) const MULTI_STEP_RIG: &str = r#"{ part_radius_mm = 30, sensors = [{ id = "S1", angle_deg = 0, z_mm = 100 },
+    { id = "S2", angle_deg = 99.844, z_mm = 100 }, { id = "S3", angle_deg = 202.5, z_mm = 100 }],
+    setups = [{ id = "a" }, { id = "b", part_deg = 99.844 }, { id = "c", part_deg = 202.5 }] }"#;
+
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Simulated {
