@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 
 use super::{
     Effect, Fit, Model, Remainder, Setting,
-    diagnosis::{Diagnosis, Refused, Unexplained},
+    diagnosis::{Diagnosis, Refused, Unexplained, Verdict},
     evidence::Evidence,
     fit::{INDEPENDENT, Refit, refit},
     found::{Declaration, FoundEffect},
@@ -107,6 +107,7 @@ pub fn diagnose<M: Model>(model: &M, settings: &Settings) -> Result<Closed<M::Fi
         current = tracing.refit_found(model, &current.settings)?;
     }
     let held_out = [declared, current.fit.remainder().clone()];
+    let not_chosen = tracing.not_chosen(&current);
     let found = current.settings.clone();
     drop(current);
     let before = model.whole().fit(&settings.known)?;
@@ -114,11 +115,15 @@ pub fn diagnose<M: Model>(model: &M, settings: &Settings) -> Result<Closed<M::Fi
     let (current, others) = tracing.combinations(model.whole(), current, SAME_BIC);
     let consistency = current.fit.consistency();
     let left = noise_only(current.fit.remainder(), &consistency);
-    let verdict = verdict(current.fit.remainder(), &consistency, tracing.found.is_empty());
+    let verdict = match &not_chosen {
+        Some(_) => Verdict::Unexplained,
+        None => verdict(current.fit.remainder(), &consistency, tracing.found.is_empty()),
+    };
     tracing.settle(&current);
     let applied = current.settings.clone();
     let after = mixed(current, others, &before, settings.known.len());
-    let mut unexplained = after.far_worse();
+    let mut unexplained: Vec<Unexplained> = not_chosen.into_iter().collect();
+    unexplained.extend(after.far_worse());
     if !left {
         unexplained.extend(after.unexplained());
     }
@@ -166,6 +171,25 @@ impl<M: Model> Tracing<'_, M> {
         let wanted = |index: usize| !declared(index) && !left_out(index);
         let effects = self.model.effects().iter().enumerate();
         effects.filter(|(index, effect)| chosen(effect) && wanted(*index)).map(|(index, _)| index).collect()
+    }
+
+    /// What an effect explains that was not to be looked for, where the evidence supports it: what was found beside it is not what it is taken for.
+    fn not_chosen(&self, current: &Refit<M::Fit>) -> Option<Unexplained> {
+        self.settings.effects.as_ref()?;
+        let left_out = self.considered().into_iter().chain(self.settings.left_out.iter().copied()).collect();
+        let settings = Settings { effects: None, left_out, ..self.settings.clone() };
+        let mut others =
+            Tracing { model: self.model, settings: &settings, found: self.found.clone(), refused: Vec::new() };
+        let FoundEffect { members, before, after, .. } = others.next(current)?;
+        let name = self.model.effects()[members[0]].name();
+        Some(Unexplained {
+            station: None,
+            sensor: None,
+            setup: None,
+            orders: [0, 0],
+            rms_um: (before.rms.powi(2) - after.rms.powi(2)).max(0.0).sqrt(),
+            place: format!("{name} explains it, which is none of the chosen `effects`"),
+        })
     }
 
     fn active(&self, effect: usize) -> bool {

@@ -2,15 +2,22 @@
 
 use std::{
     cell::Cell,
+    num::NonZero,
     panic::resume_unwind,
-    thread::{ScopedJoinHandle, scope},
+    sync::LazyLock,
+    thread::{ScopedJoinHandle, available_parallelism, scope},
 };
+
+/// Items of which [`spread`] begins threads: a thread takes as long to begin as a short piece of work.
+const FEWEST: usize = 8;
+
+static PROCESSORS: LazyLock<usize> = LazyLock::new(|| available_parallelism().map_or(1, NonZero::get));
 
 thread_local! {
     static ALONE: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Does work of which [`both`] and [`each`] leave all parts on this thread: the others have recordings of their own.
+/// Does work of which [`both`], [`each`] and [`spread`] leave all parts on this thread: the others have recordings of their own.
 pub fn alone<T>(work: impl FnOnce() -> T) -> T {
     /// Also after a panic.
     struct Before(bool);
@@ -52,6 +59,15 @@ pub fn each<I: Send, T: Send>(items: impl IntoIterator<Item = I>, work: impl Fn(
     })
 }
 
+/// Does the same with each of many items, on a thread for each processor; what comes of it is in their order.
+pub fn spread<I: Sync, T: Send>(items: &[I], work: impl Fn(&I) -> T + Sync) -> Vec<T> {
+    if is_alone() || *PROCESSORS == 1 || items.len() < FEWEST {
+        return items.iter().map(work).collect();
+    }
+    let runs = items.chunks(items.len().div_ceil(*PROCESSORS));
+    each(runs, |run| alone(|| run.iter().map(&work).collect::<Vec<T>>())).into_iter().flatten().collect()
+}
+
 fn joined<T>(thread: ScopedJoinHandle<T>) -> T {
     thread.join().unwrap_or_else(|panic| resume_unwind(panic))
 }
@@ -73,5 +89,8 @@ mod tests {
         let (other, own) = ids();
         assert!(other != here && own == here);
         assert_eq!(each(0..5, |item| 2 * item), [0, 2, 4, 6, 8]);
+        let many: Vec<usize> = (0..101).collect();
+        assert_eq!(spread(&many, |item| *item), many);
+        assert!(alone(|| spread(&many, |_| current().id())).iter().all(|id| *id == here));
     }
 }

@@ -1,5 +1,6 @@
 //! Files that appear whole or not at all, one by one or together.
 
+mod durable;
 mod faults;
 mod full_disk;
 mod lock;
@@ -92,8 +93,7 @@ impl PendingFile {
 
     /// Has the contents last, whatever happens to the machine.
     fn sync(&self) -> Result<()> {
-        let sync = || fs::File::options().write(true).open(&self.temporary)?.sync_all();
-        faults::step().and_then(|()| sync()).map_err(|error| self.caused(error))
+        durable::file(&self.temporary).map_err(|error| self.caused(error))
     }
 
     /// Refuses to begin what may not fit: a library that the disk fails in the middle of a file may not survive it.
@@ -226,7 +226,7 @@ fn remove_stale(folder: &Path, name: &str) {
 /// # Errors
 /// When the file system refuses a rename; those before it are taken back.
 pub fn commit_all(files: Vec<PendingFile>) -> Result<Vec<PathBuf>> {
-    commit(files, publication::publish)
+    commit(files, sync_each, publication::publish)
 }
 
 /// Gives finished files their names, the last of them when all others have theirs and these last: whoever finds the last file finds all.
@@ -236,13 +236,29 @@ pub fn commit_all(files: Vec<PendingFile>) -> Result<Vec<PathBuf>> {
 /// # Errors
 /// When the file system refuses a rename; those before it are taken back.
 pub fn commit_last_after_others(files: Vec<PendingFile>) -> Result<Vec<PathBuf>> {
-    commit(files, publication::publish_last_after_others)
+    let sync = |files: &[PendingFile]| {
+        let folders = files.iter().map(|file| folder_of(&file.temporary));
+        let is_done = durable::all_in(folders).map_err(|error| {
+            let first = files.first().map(|file| file.destination.display().to_string());
+            Error::caused("write", first.unwrap_or_default(), error)
+        })?;
+        if is_done { Ok(()) } else { sync_each(files) }
+    };
+    commit(files, sync, publication::publish_last_after_others)
 }
 
-fn commit(mut files: Vec<PendingFile>, publish: impl FnOnce(&[(&Path, &Path)]) -> Result<()>) -> Result<Vec<PathBuf>> {
+/// One after the other, each would wait for the disk by itself.
+fn sync_each(files: &[PendingFile]) -> Result<()> {
+    threads::each(files, PendingFile::sync).into_iter().collect()
+}
+
+fn commit(
+    mut files: Vec<PendingFile>,
+    sync: impl FnOnce(&[PendingFile]) -> Result<()>,
+    publish: impl FnOnce(&[(&Path, &Path)]) -> Result<()>,
+) -> Result<Vec<PathBuf>> {
     let _publishing = UnderWay::now().publish(&files)?;
-    // One after the other, each would wait for the disk by itself.
-    threads::each(&files, PendingFile::sync).into_iter().collect::<Result<()>>()?;
+    sync(&files)?;
     let names: Vec<_> = files.iter().map(|file| (file.temporary.as_path(), file.destination.as_path())).collect();
     publish(&names)?;
     let mut under_way = UnderWay::now();

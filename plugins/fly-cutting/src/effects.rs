@@ -29,6 +29,10 @@ pub(crate) enum Missing {
     TiltLine,
     /// Motion that repeats with the turn: a shape along y that all passes have.
     SynchronousMotion,
+    /// The map is turned about its normal.
+    MapRotation,
+    /// The radius of the cutter is not the declared one.
+    CutterRadius,
 }
 
 /// Id of all lines.
@@ -37,7 +41,7 @@ pub(crate) const SPINDLE_LINE: &str = "spindle-line";
 pub(crate) const MOST_LINES: usize = 3;
 
 /// All effects.
-pub(crate) const MISSING: [Missing; 6 + MOST_LINES] = [
+pub(crate) const MISSING: [Missing; 8 + MOST_LINES] = [
     Missing::WorkpieceTilt,
     Missing::TableStraightness,
     Missing::FeedScale,
@@ -47,6 +51,8 @@ pub(crate) const MISSING: [Missing; 6 + MOST_LINES] = [
     Missing::SpindleLine(2),
     Missing::TiltLine,
     Missing::SynchronousMotion,
+    Missing::MapRotation,
+    Missing::CutterRadius,
 ];
 
 impl Missing {
@@ -65,6 +71,10 @@ impl Missing {
             Self::SynchronousMotion => {
                 ("synchronous-motion", "motion that repeats with the turn gives all passes one shape")
             }
+            Self::MapRotation => {
+                ("map-rotation", "a height map is turned about its normal against the feed of its cut")
+            }
+            Self::CutterRadius => ("cutter-radius", "the radius of a fly cutter is not the declared one"),
         }
     }
 
@@ -84,6 +94,8 @@ impl Missing {
             Self::TableStraightness | Self::SynchronousMotion => (vec![], orders()),
             Self::FeedScale => (vec![], vec![parameter("scale", "um/m", 1000.0)]),
             Self::NoseRadius => (vec![], vec![parameter("change", "mm", 0.5)]),
+            Self::MapRotation => (vec![], vec![parameter("angle", "urad", 1000.0)]),
+            Self::CutterRadius => (vec![], vec![parameter("change", "mm", 1.0)]),
             Self::SpindleLine(0) => (vec![], line(parameter("amplitude", "nm", 5.0))),
             Self::SpindleLine(number) => {
                 (vec![format!("line {}", number + 1)], line(parameter("amplitude", "nm", 5.0)))
@@ -114,6 +126,8 @@ impl Missing {
             }
             (Self::FeedScale, [scale]) => applied.feed_scale = 1e-6 * scale,
             (Self::NoseRadius, [change]) => applied.radius_mm = *change,
+            (Self::MapRotation, [angle]) => applied.rotation = 1e-6 * angle,
+            (Self::CutterRadius, [change]) => applied.cutter_mm = *change,
             (Self::SpindleLine(_) | Self::TiltLine, [ratio, amplitude, phase_deg]) => applied.lines.push(Line {
                 ratio: *ratio,
                 amplitude: *amplitude,
@@ -138,6 +152,8 @@ impl Missing {
                 let (pass, beside_mm) = (f64::from(surface.pass[point]), surface.beside_mm[point]);
                 let mut add =
                     |values: &[f64]| columns.iter_mut().zip(values).for_each(|(column, value)| column.push(*value));
+                // Change of the height with the place of the pass, in nm/mm.
+                let moved = || -cut.slope(beside_mm) * row.cosine;
                 match self {
                     // µrad times mm is nm.
                     Self::WorkpieceTilt => add(&[heights.x_mm[point], row.y_mm]),
@@ -145,7 +161,17 @@ impl Missing {
                     Self::SynchronousMotion => add(&cut.across(row)),
                     Self::FeedScale => {
                         let turns = pass + row.angle / TAU;
-                        add(&[-1e-6 * cut.slope(beside_mm) * row.cosine * cut.declared_mm * turns]);
+                        add(&[1e-6 * moved() * cut.declared_mm * turns]);
+                    }
+                    Self::MapRotation => {
+                        let (sine, cosine) = cut.applied.rotation.sin_cos();
+                        let turned_mm = cosine * row.y_mm + heights.x_mm[point] * (sine - cosine * row.angle.tan());
+                        add(&[1e-6 * moved() * turned_mm]);
+                    }
+                    // d/dr of √(r² − y²) − r.
+                    Self::CutterRadius => {
+                        let r = cut.cutter_mm;
+                        add(&[moved() * (r / (r * r - row.y_mm * row.y_mm).sqrt() - 1.0)]);
                     }
                     Self::NoseRadius => {
                         let square = beside_mm * beside_mm;

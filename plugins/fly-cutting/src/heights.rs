@@ -13,8 +13,6 @@ pub(crate) struct Row {
     /// Angle of the tool where it crosses the row, in radians; its cosine.
     pub angle: f64,
     pub cosine: f64,
-    /// x of the arc that the tool describes, less that at y = 0, without the feed meanwhile, in mm.
-    pub sag_mm: f64,
     /// Its points.
     pub points: Range<usize>,
 }
@@ -159,7 +157,6 @@ const FEWEST_ROWS: usize = 48;
 impl Row {
     fn new(y_mm: f64, radius_mm: f64, points: Range<usize>) -> Self {
         let sine = y_mm / radius_mm;
-        let cosine = (1.0 - sine * sine).sqrt();
-        Self { y_mm, angle: sine.asin(), cosine, sag_mm: -y_mm * sine / (1.0 + cosine), points }
+        Self { y_mm, angle: sine.asin(), cosine: (1.0 - sine * sine).sqrt(), points }
     }
 }

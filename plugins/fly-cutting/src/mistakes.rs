@@ -3,7 +3,7 @@
 
 use runout_core::{
     closed_loop::{Fit, Model},
-    points::{Points, mistakes},
+    points::{Column, Points, mistakes},
 };
 
 use crate::{heights::Heights, model::CutModel, separate::FlyCutting};
@@ -12,6 +12,8 @@ use crate::{heights::Heights, model::CutModel, separate::FlyCutting};
 const FAR: f64 = 0.7;
 /// And said where the correction leaves less than this share of it.
 const SHARE: f64 = 0.5;
+/// Points that are looked at.
+const LOOKED_AT: usize = 40_000;
 /// Units by which heights or places are exchanged.
 const UNITS: [(f64, &str); 4] = [
     (1e3, "a thousand times too small"),
@@ -22,7 +24,8 @@ const UNITS: [(f64, &str); 4] = [
 
 impl FlyCutting {
     /// The likeliest mistake, where the declared cut explains little of the map.
-    pub(crate) fn mistake(&self, points: &Points) -> Option<String> {
+    pub(crate) fn mistake(&self, heights: &Heights) -> Option<String> {
+        let points = &as_points(heights.thinned(LOOKED_AT));
         let declared = self.share(points).filter(|share| *share > FAR)?;
         let turned = mistakes::columns(points, &[["x_mm", "y_mm"]], &[&["x_mm"]]);
         let scaled = |columns: &'static [&'static str], what: &'static str| {
@@ -42,6 +45,13 @@ impl FlyCutting {
         let left_um = CutModel::new(&self.0, &heights, &[]).fit(&[]).ok()?.remainder().rms;
         (rms_nm > 0.0).then_some(1e3 * left_um / rms_nm)
     }
+}
+
+fn as_points(heights: Heights) -> Points {
+    let y_mm = heights.y_mm().collect();
+    let columns = [("x_mm", heights.x_mm), ("y_mm", y_mm), ("height_nm", heights.height_nm)];
+    let columns = columns.map(|(name, values)| Column { name: name.into(), values });
+    Points { columns: columns.into(), ..Points::default() }
 }
 
 fn times_factor(points: &Points, columns: &[&str], factor: f64) -> Points {

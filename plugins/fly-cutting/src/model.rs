@@ -20,10 +20,10 @@ use crate::{
     cells::Cells,
     config::FlyCuttingConfig,
     effects::{MISSING, Missing, applied, tidy},
-    heights::Heights,
+    heights::{Heights, Row},
     passes::{Cut, Line},
     phase::{self, Phased, without_mean},
-    search::{self, FEWEST_PERIODS, Left},
+    search::{self, FEWEST_PERIODS, Left, Shift},
 };
 
 /// Points that the search looks at, and those of the final fit.
@@ -35,6 +35,9 @@ const SAMPLED: usize = 4_000;
 const HELD_OUT: usize = 5;
 /// A nose radius of less than this share of the declared one, or of more than its inverse, is none.
 const LEAST_RADIUS: f64 = 0.1;
+/// Angles of a map in µrad, and changes of the cutter's radius as a share of it, that are looked at.
+const ROTATIONS_URAD: f64 = 3e4;
+const CUTTERS: f64 = 0.2;
 
 /// The data of a model.
 #[derive(Debug)]
@@ -46,6 +49,18 @@ pub(crate) struct Data {
     pub extent_mm: [[f64; 2]; 2],
     /// Effects that are declared with their values.
     known: Vec<usize>,
+}
+
+impl Data {
+    /// How an effect that shifts rows is looked for.
+    fn searched(&self, missing: Missing) -> Option<Shift> {
+        let (shift_mm, farthest): (fn(&Row) -> f64, f64) = match missing {
+            Missing::MapRotation => (|row| 1e-6 * row.y_mm, ROTATIONS_URAD),
+            Missing::CutterRadius => (|row| row.cosine.recip() - 1.0, CUTTERS * self.config.cutter_radius_mm),
+            _ => return None,
+        };
+        Shift::new(&self.fitted.rows, shift_mm, farthest, 1e-3 * self.config.feed_um_per_rev)
+    }
 }
 
 /// The model.
@@ -163,6 +178,11 @@ impl Model for CutModel {
             Missing::FeedScale => {
                 let fit = self.fit(applied).ok()?;
                 fit.left().feed_scale(&fit.cut).map(|scale| vec![1e6 * scale])
+            }
+            Missing::MapRotation | Missing::CutterRadius => {
+                let fit = self.fit(applied).ok()?;
+                let searched = self.data.searched(*missing)?;
+                fit.left().shifted(&fit.cut, &searched).map(|change| vec![change])
             }
             Missing::SpindleLine(_) | Missing::TiltLine => {
                 self.best_start(effect, applied, self.fit(applied).ok()?.starts(*missing))
@@ -358,6 +378,7 @@ impl Fit for CutFit {
         match MISSING.get(effect) {
             Some(missing) if missing.line().is_some() => passes * self.data.config.max_frequency_ratio,
             Some(Missing::FeedScale) => search::feeds(passes),
+            Some(missing) => self.data.searched(*missing).map_or(1, |searched| searched.tried()),
             _ => 1,
         }
     }

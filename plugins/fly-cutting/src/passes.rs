@@ -1,7 +1,8 @@
 //! The model of a surface: heights of passes, and the lowest of them at each point.
 //!
 //! Pass n crosses a row at x = n·f + f·θ/2π + r(cos θ − 1) + p, with sin θ = y/r and p the phase of the scallops. At a distance d from
-//! it, measured along the radius of the cutter, its edge is R − √(R² − d²) above its tip.
+//! it, measured along the radius of the cutter, its edge is R − √(R² − d²) above its tip. A map that is turned by ε shows that place at
+//! x(cos ε + sin ε tan θ) − y sin ε.
 
 use std::f64::consts::TAU;
 
@@ -81,6 +82,10 @@ pub(crate) struct Applied {
     pub feed_scale: f64,
     /// Actual less declared nose radius, in mm.
     pub radius_mm: f64,
+    /// Angle of the map about its normal, in rad.
+    pub rotation: f64,
+    /// Actual less declared radius of the cutter, in mm.
+    pub cutter_mm: f64,
     /// Slopes of the map along x and y, in µrad.
     pub tilt_urad: [f64; 2],
     /// Legendre polynomials of the table, from order 2, in nm.
@@ -96,6 +101,8 @@ impl Applied {
         Self {
             feed_scale: 0.0,
             radius_mm: 0.0,
+            rotation: 0.0,
+            cutter_mm: 0.0,
             tilt_urad: [0.0; 2],
             table_nm: [0.0; ORDERS],
             shape_nm: [0.0; ORDERS],
@@ -112,6 +119,7 @@ pub(crate) struct Cut {
     /// Actual feed, in mm.
     pub feed_mm: f64,
     pub nose_mm: f64,
+    pub cutter_mm: f64,
     pub applied: Applied,
     /// Middle and half of the length of the map along x, and along y, in mm.
     pub middle_mm: [[f64; 2]; 2],
@@ -144,18 +152,30 @@ impl Cut {
         let declared_mm = 1e-3 * config.feed_um_per_rev;
         let (feed_mm, nose_mm) = (declared_mm * (1.0 + applied.feed_scale), config.nose_radius_mm + applied.radius_mm);
         let middle_mm = extent_mm.map(|[from, to]| [0.5 * (from + to), 0.5 * (to - from)]);
-        (applied.feed_scale > -0.5 && applied.feed_scale < 1.0 && nose_mm > feed_mm).then_some(Self {
+        let cutter_mm = config.cutter_radius_mm + applied.cutter_mm;
+        let reaches = extent_mm[1].iter().all(|y_mm| y_mm.abs() < cutter_mm);
+        (reaches && applied.feed_scale > -0.5 && applied.feed_scale < 1.0 && nose_mm > feed_mm).then_some(Self {
             declared_mm,
             feed_mm,
             nose_mm,
+            cutter_mm,
             applied,
             middle_mm,
         })
     }
 
-    /// x at which the pass 0 crosses a row, in mm.
+    /// Where the pass 0 crosses a row, in mm: x times [`stretch`](Self::stretch) is counted from there.
     pub(crate) fn first_mm(&self, row: &Row) -> f64 {
-        row.sag_mm + self.feed_mm * row.angle / TAU
+        // r(cos θ − 1), without cancellation.
+        let (y_mm, r) = (row.y_mm, self.cutter_mm);
+        let sag_mm = -y_mm * y_mm / (r + (r * r - y_mm * y_mm).sqrt());
+        sag_mm + self.feed_mm * row.angle / TAU + self.applied.rotation.sin() * y_mm
+    }
+
+    /// What places along a row of a turned map are multiplied by, since arcs cross it at a slope.
+    pub(crate) fn stretch(&self, row: &Row) -> f64 {
+        let (sine, cosine) = self.applied.rotation.sin_cos();
+        cosine + sine * row.angle.tan()
     }
 
     /// Place of the table at a pass, from −1 to 1 over the map.
@@ -249,8 +269,8 @@ impl Cut {
 
     /// Turns from the pass 0 to the first and the last point of a row.
     fn ends(&self, heights: &Heights, row: &Row, phase_mm: f64) -> [f64; 2] {
-        let start_mm = self.first_mm(row) + phase_mm;
-        [row.points.start, row.points.end - 1].map(|point| (heights.x_mm[point] - start_mm) / self.feed_mm)
+        let (start_mm, stretch) = (self.first_mm(row) + phase_mm, self.stretch(row));
+        [row.points.start, row.points.end - 1].map(|point| (heights.x_mm[point] * stretch - start_mm) / self.feed_mm)
     }
 
     fn row(
@@ -284,10 +304,10 @@ impl Cut {
         let [tilt_x, tilt_y] = self.applied.tilt_urad;
         let shape_nm: f64 = self.across(row).iter().zip(self.applied.shape_nm).map(|(value, size)| value * size).sum();
         let start_mm = self.first_mm(row) + phase_mm + self.feed_mm * first as f64;
-        let per_mm = self.feed_mm.recip();
+        let (per_mm, stretch) = (self.feed_mm.recip(), self.stretch(row));
         let reach = reach as usize;
         for x in &heights.x_mm[row.points.clone()] {
-            let at = (x - start_mm) * per_mm;
+            let at = (x * stretch - start_mm) * per_mm;
             let nearest = ((at + 0.5) as usize).clamp(reach, count - 1 - reach);
             let mut best = (f64::INFINITY, 0, 0.0);
             let mut cut = |pass: usize| {

@@ -1,4 +1,4 @@
-//! Where a line or another feed may be: correlations of what is left with every frequency.
+//! Where a line, another feed or shifted rows may be: correlations of what is left with every frequency.
 //!
 //! A line of q periods a turn adds Re a·e^{2πi q τ} at the turns τ = n + θ/2π. n is whole, so that e^{2πi q n} has the fraction of q
 //! only; the rows, whose angles θ differ, show the whole part. The sum over passes is a Fourier transform a row, the sum over rows is
@@ -12,6 +12,7 @@ use rustfft::FftPlanner;
 use crate::{
     heights::{Heights, Row},
     passes::{Cut, Line, PassTurns, Surface},
+    phase::without_mean,
 };
 
 /// Frequencies for each that the passes resolve.
@@ -31,10 +32,46 @@ const BESIDE: f64 = 3.0;
 const FEEDS: f64 = 0.03;
 /// Part of a period at the end of the map between feeds that are looked at.
 const FEED_STEP: f64 = 0.4;
+/// Shifts of rows that are looked at, to each side.
+const MOST_SHIFTS: f64 = 2000.0;
+/// What has to explain more than the declared cut by this factor, so that a search begins elsewhere.
+const MORE: f64 = 1.1;
 
 /// Other feeds that are looked at, of a map of so many passes.
 pub(crate) fn feeds(passes: usize) -> usize {
     (2.0 * FEEDS * passes as f64 / FEED_STEP).ceil() as usize
+}
+
+/// A parameter that shifts rows along the feed, as it is looked for.
+#[derive(Debug, Clone)]
+pub(crate) struct Shift {
+    /// By row, in mm per unit.
+    per_unit_mm: Vec<f64>,
+    /// Values are multiples of it.
+    step: f64,
+    /// To each side.
+    count: i32,
+}
+
+impl Shift {
+    /// Up to `farthest`, in steps that the farthest rows show, and not so far that neighbours are shifted by half a feed. `None` where all rows are
+    /// shifted alike.
+    pub(crate) fn new(rows: &[Row], shift_mm: impl Fn(&Row) -> f64, farthest: f64, feed_mm: f64) -> Option<Self> {
+        let per_unit_mm: Vec<f64> = rows.iter().map(shift_mm).collect();
+        let (low, high) = per_unit_mm
+            .iter()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), shift| (low.min(*shift), high.max(*shift)));
+        let widest = per_unit_mm.windows(2).map(|pair| (pair[1] - pair[0]).abs()).fold(0.0, f64::max);
+        let step = FEED_STEP * feed_mm / (high - low);
+        let farthest = farthest.min(0.5 * feed_mm / widest);
+        let count = (farthest / step).floor().min(MOST_SHIFTS);
+        (step.is_finite() && count >= 1.0).then_some(Self { per_unit_mm, step, count: count as i32 })
+    }
+
+    /// Values that are looked at.
+    pub(crate) fn tried(&self) -> usize {
+        2 * self.count as usize + 1
+    }
 }
 
 /// What is left of a map, pass by pass.
@@ -166,12 +203,7 @@ impl Left<'_> {
     /// The relative error of the feed at which scallops explain most, the residual with those of the model put back; `None` where the
     /// declared feed explains as much.
     pub(crate) fn feed_scale(&self, cut: &Cut) -> Option<f64> {
-        let mut heights = self.residual_nm.to_vec();
-        let square = cut.nose_mm * cut.nose_mm;
-        for (height, beside_mm) in heights.iter_mut().zip(&self.surface.beside_mm) {
-            *height += 1e6 * beside_mm * beside_mm / (cut.nose_mm + (square - beside_mm * beside_mm).sqrt());
-        }
-        let mean = heights.iter().sum::<f64>() / heights.len().max(1) as f64;
+        let heights = self.with_scallops(cut);
         let [low, high] = self.passes()?;
         let farthest = f64::from(low.abs().max(high.abs())).max(1.0);
         let length = f64::from(high - low).max(1.0);
@@ -184,10 +216,11 @@ impl Left<'_> {
         for row in &self.heights.rows {
             turned.clear();
             steps.clear();
+            let (stretch, start_mm) = (cut.stretch(row), cut.first_mm(row) - cut.feed_mm * row.angle / TAU);
             for point in row.points.clone() {
-                let turns = (self.heights.x_mm[point] - row.sag_mm) * per_mm;
+                let turns = (self.heights.x_mm[point] * stretch - start_mm) * per_mm;
                 let first = (1.0 + step * f64::from(count)) * turns - row.angle / TAU;
-                turned.push(Complex64::from_polar(heights[point] - mean, -TAU * first));
+                turned.push(Complex64::from_polar(heights[point], -TAU * first));
                 steps.push(Complex64::from_polar(1.0, TAU * step * turns));
             }
             for sum in &mut sums {
@@ -206,7 +239,44 @@ impl Left<'_> {
         let declared = explained(count as usize);
         let best = (scale(best), explained(best));
         let moved = (best.0 - cut.applied.feed_scale).abs() * farthest;
-        (moved > 0.5 * FEED_STEP && best.1 > 1.1 * declared).then_some(best.0)
+        (moved > 0.5 * FEED_STEP && best.1 > MORE * declared).then_some(best.0)
+    }
+
+    /// The value at which scallops of shifted rows explain most; `None` where they explain as much as they are.
+    pub(crate) fn shifted(&self, cut: &Cut, shift: &Shift) -> Option<f64> {
+        let heights = self.with_scallops(cut);
+        let per_mm = cut.feed_mm.recip();
+        let waves = self.heights.rows.iter().map(|row| {
+            let (stretch, start_mm) = (cut.stretch(row), cut.first_mm(row));
+            let turned = |point: usize| {
+                let turns = (self.heights.x_mm[point] * stretch - start_mm) * per_mm;
+                Complex64::from_polar(heights[point], -TAU * turns)
+            };
+            row.points.clone().map(turned).sum::<Complex64>()
+        });
+        let waves: Vec<Complex64> = waves.collect();
+        let explained = |index: i32| {
+            let value = f64::from(index) * shift.step;
+            let turned = waves
+                .iter()
+                .zip(&shift.per_unit_mm)
+                .map(|(wave, shift_mm)| wave * Complex64::cis(TAU * value * shift_mm * per_mm));
+            turned.sum::<Complex64>().norm_sqr()
+        };
+        let all = (-shift.count..=shift.count).map(|index| (index, explained(index)));
+        let (best, most) = all.max_by(|one, other| one.1.total_cmp(&other.1))?;
+        (best != 0 && most > MORE * explained(0)).then_some(f64::from(best) * shift.step)
+    }
+
+    /// What is left without its mean, with the scallops of the model put back.
+    fn with_scallops(&self, cut: &Cut) -> Vec<f64> {
+        let mut heights = self.residual_nm.to_vec();
+        let square = cut.nose_mm * cut.nose_mm;
+        for (height, beside_mm) in heights.iter_mut().zip(&self.surface.beside_mm) {
+            *height += 1e6 * beside_mm * beside_mm / (cut.nose_mm + (square - beside_mm * beside_mm).sqrt());
+        }
+        without_mean(&mut heights);
+        heights
     }
 }
 

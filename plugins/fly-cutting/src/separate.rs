@@ -88,7 +88,7 @@ impl PointSeparator for FlyCutting {
             ));
         }
         remarks.extend(smaller(left.noise_is_known(), left.chi2_per_dof(), left.dof));
-        remarks.splice(..0, self.mistake(points));
+        remarks.splice(..0, self.mistake(&measured.heights));
         let checks = fit.consistency();
         Ok(Outcome { checks, ..self.fitted_outcome(&measured, (&fit, &fit), &[], remarks)? })
     }

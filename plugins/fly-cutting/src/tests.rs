@@ -26,7 +26,7 @@ fn heights(effects: &str) -> Heights {
 }
 
 /// Each effect, small and far beyond the usual.
-const EFFECTS: [(usize, &[f64], &str); 9] = [
+const EFFECTS: [(usize, &[f64], &str); 12] = [
     (0, &[700.0, -90.0], "plugin = 'workpiece-tilt'\nx_urad = 700.0\ny_urad = -90.0"),
     (1, &[0.0, 300.0, 0.0, 0.0], "plugin = 'table-straightness'\norder = 3\namplitude_nm = 300.0"),
     (1, &[0.0, 0.0, 0.0, -4.0], "plugin = 'table-straightness'\norder = 5\namplitude_nm = -4.0"),
@@ -44,6 +44,9 @@ const EFFECTS: [(usize, &[f64], &str); 9] = [
         &[1.3, 0.4, 10.0],
         "plugin = 'spindle-line'\nfrequency_ratio = 1.3\namplitude_urad = 0.4\nphase_deg = 10.0\ndirection = 'tilt-x'",
     ),
+    (9, &[400.0], "plugin = 'map-rotation'\nangle_urad = 400.0"),
+    (9, &[-5.3], "plugin = 'map-rotation'\nangle_urad = -5.3"),
+    (10, &[0.5], "plugin = 'cutter-radius'\nchange_mm = 0.5"),
 ];
 
 /// Picometres: what the first order in the distance from a pass leaves.

@@ -61,13 +61,17 @@ fn the_line_of_the_paper_is_found() {
 #[test]
 fn every_effect_is_found_with_its_size() {
     #[allow(clippy::type_complexity, reason = "a table of cases")]
-    let cases: [(&str, &str, &[(&str, f64)]); 6] = [
+    let cases: [(&str, &str, &[(&str, f64)]); 9] = [
         // A·cos 3θ is A − 4.5·A·(y/r)²: over y from 0 to 3.975 mm −7.584 nm of P2 and a slope of −11.448 nm/mm.
         ("synchronous-motion", "", &[("order_2", -7.584), ("order_3", 0.0)]),
         ("workpiece-tilt", "x_urad = 3.0\ny_urad = -1.5", &[("x", 3.0), ("y", -1.5)]),
         ("table-straightness", "order = 3\namplitude_nm = 2.0", &[("order_3", 2.0), ("order_2", 0.0)]),
         ("feed-scale", "scale_um_per_m = 3000", &[("scale", 3000.0)]),
         ("nose-radius", "change_mm = 0.8", &[("change", 0.8)]),
+        // Rows are shifted by a tenth of a feed, and by five feeds.
+        ("map-rotation", "angle_urad = 200", &[("angle", 200.0)]),
+        ("map-rotation", "angle_urad = -10000", &[("angle", -10_000.0)]),
+        ("cutter-radius", "change_mm = 9", &[("change", 9.0)]),
         (
             "spindle-line",
             "frequency_ratio = 2.3\ndirection = 'tilt-x'\namplitude_urad = 0.8",

@@ -227,7 +227,8 @@ impl PointSeparator for Diagonals {
         }
         said.extend(missing(&all));
         let sizes = all.iter().map(|one| (format!("diagonal {}", one.id), one.cells.size()));
-        let mut checks: Vec<Check> = unlike_units(&sizes.collect::<Vec<(String, f64)>>()).into_iter().collect();
+        let mut checks: Vec<Check> =
+            unlike_units(&sizes.collect::<Vec<(String, f64)>>(), "convert their file").into_iter().collect();
         let mut first = 0;
         for one in &all {
             let last = first + one.values().len();

@@ -231,7 +231,7 @@ impl Probing {
             return plain;
         }
         let sizes = touches.sets.iter().zip(&ranges).map(|(set, range)| (format!("set {}", set.number), *range));
-        said.checks.extend(unlike_units(&sizes.collect::<Vec<(String, f64)>>()));
+        said.checks.extend(unlike_units(&sizes.collect::<Vec<(String, f64)>>(), "convert their file"));
         let names: Vec<String> = (1..=count).map(|set| format!("touch of set {set}:")).collect();
         let of_sets: Vec<(&str, &[f64])> =
             names.iter().map(String::as_str).zip(noise.iter().map(Vec::as_slice)).collect();

@@ -2,60 +2,25 @@
 //! the range of displacement sensors, or below their noise.
 
 use runout_core::{
-    Complex64,
-    consistency::{Check, Test},
-    numerics::number::significant,
-    points::measured::unlike_units,
-    rig::Rig,
+    Complex64, consistency::Check, numerics::number::significant, points::measured::unlike_units, rig::Rig,
 };
 
 use crate::solve::Readings;
 
-/// From one unit of length to the next.
-const BETWEEN_UNITS: f64 = 1e3;
-/// Readings of sensors that look the same way differ by less than this in size.
-const USUAL_RATIO: f64 = 3.0;
-/// So many others show what is usual.
-const FEWEST_OTHERS: usize = 2;
 /// Amplitude above the eccentricity of a part that is measured by displacement sensors, in µm. Cams have more.
 const LARGEST_UM: f64 = 2000.0;
 /// Amplitude below the eccentricity of a part that is centred as well as can be, and below the noise of usual sensors, in µm.
 const SMALLEST_UM: f64 = 0.005;
 
-/// Names each sensor whose readings are about a thousand times smaller or larger than the median of the other sensors that look
-/// the same way, and setups likewise.
+/// Sensors that look the same way, and setups, of which some are about a thousand times smaller or larger than the others.
 pub(crate) fn mistaken_units(rig: &Rig, readings: &Readings) -> Vec<Check> {
     let sizes = sizes(rig, readings);
-    let sensors = rig.sensors.len();
-    let near = |ratio: f64| (BETWEEN_UNITS / USUAL_RATIO..BETWEEN_UNITS * USUAL_RATIO).contains(&ratio);
-    let looks_along = |sensor: usize| looks_along(rig, sensor);
-    let said = |sensor: usize| {
-        let others = (0..sensors).filter(|other| *other != sensor && looks_along(*other) == looks_along(sensor));
-        let mut others: Vec<f64> = others.map(|other| sizes[other]).collect();
-        if others.len() < FEWEST_OTHERS || sizes[sensor] == 0.0 {
-            return None;
-        }
-        others.sort_by(f64::total_cmp);
-        let ratio = sizes[sensor] / others[others.len() / 2];
-        let id = &rig.sensors[sensor].id;
-        if near(1.0 / ratio) {
-            Some(format!(
-                "the readings of sensor `{id}` are {:.0} times smaller than those of the others: they may be in a larger unit (millimetres \
-                 where µm is declared): write `unit = \"mm\"` at the sensor",
-                1.0 / ratio
-            ))
-        } else if near(ratio) {
-            Some(format!(
-                "the readings of sensor `{id}` are {ratio:.0} times larger than those of the others: they may be in a smaller unit \
-                 (nanometres where µm is declared): write `unit = \"nm\"` at the sensor"
-            ))
-        } else {
-            None
-        }
-    };
-    let check =
-        |words: String| Check::new(Test::Measured, "units of the sensors", BETWEEN_UNITS, &[], 0.0).finding(|| words);
-    (0..sensors).filter_map(said).map(check).chain(unlike_units(&setups(rig, readings))).collect()
+    let sensors = [false, true].map(|along| {
+        let alike = (0..sizes.len()).filter(|sensor| looks_along(rig, *sensor) == along);
+        let named = alike.map(|sensor| (format!("sensor `{}`", rig.sensors[sensor].id), sizes[sensor]));
+        unlike_units(&named.collect::<Vec<_>>(), "give those sensors their `unit` (`\"mm\"`, `\"nm\"`)")
+    });
+    sensors.into_iter().chain([unlike_units(&setups(rig, readings), "convert their file")]).flatten().collect()
 }
 
 /// What to ask where all sensors across the axis read millimetres, or all of them a few nanometres.

@@ -14,7 +14,7 @@ use std::{
 use runout_error::{Error, ErrorKind, Result};
 use serde::{Deserialize, Serialize};
 
-use super::{PARTIAL, faults, folder_of, is_alive, unpredictable};
+use super::{PARTIAL, durable, faults, folder_of, is_alive, unpredictable};
 
 const PREFIX: &str = ".runout-";
 const SUFFIX: &str = ".journal";
@@ -96,7 +96,7 @@ pub(super) fn publish(files: &[(&Path, &Path)]) -> Result<()> {
         }
     }
     let synced = match &failure {
-        None => folders(files).into_iter().try_for_each(sync_folder),
+        None => folders(files).into_iter().try_for_each(durable::folder),
         Some(_) => Ok(()),
     };
     for path in journals.iter().rev().chain(done.iter().filter_map(|(.., previous)| previous.as_ref())) {
@@ -118,7 +118,11 @@ pub(super) fn publish_last_after_others(files: &[(&Path, &Path)]) -> Result<()> 
     };
     let sync = |files: &[(&Path, &Path)]| {
         let failed = |folder: &Path, error| Error::caused("write to", folder.display().to_string(), error);
-        folders(files).into_iter().try_for_each(|folder| sync_folder(folder).map_err(|error| failed(folder, error)))
+        folders(files).into_iter().try_for_each(|folder| durable::folder(folder).map_err(|error| failed(folder, error)))
+    };
+    let sync_all = |files: &[(&Path, &Path)]| {
+        let is_done = durable::all_in(folders(files)).map_err(|error| failed(last.1, error))?;
+        if is_done { Ok(()) } else { sync(files) }
     };
     let mut renamed = 0;
     let outcome = others.iter().try_for_each(|file| {
@@ -126,7 +130,7 @@ pub(super) fn publish_last_after_others(files: &[(&Path, &Path)]) -> Result<()> 
         renamed += 1;
         Ok(())
     });
-    if let Err(error) = outcome.and_then(|()| sync(others)).and_then(|()| named(last)) {
+    if let Err(error) = outcome.and_then(|()| sync_all(others)).and_then(|()| named(last)) {
         for (temporary, destination) in others[..renamed].iter().rev() {
             // What cannot be taken back stays, without the last file.
             let _ = fs::rename(destination, temporary);
@@ -143,7 +147,7 @@ fn failed(destination: &Path, error: io::Error) -> Error {
 fn single(temporary: &Path, destination: &Path) -> io::Result<()> {
     faults::step()?;
     fs::rename(temporary, destination)?;
-    sync_folder(folder_of(destination))
+    durable::folder(folder_of(destination))
 }
 
 /// Keeps what is at a place under a second name.
@@ -178,7 +182,7 @@ fn write_journals(files: &[(&Path, &Path)], home: &Path) -> Result<Vec<PathBuf>>
             let mut file = File::options().write(true).create_new(true).open(&path)?;
             file.write_all(&serde_json::to_vec(journal)?)?;
             file.sync_all()?;
-            sync_folder(folder_of(&path))
+            durable::folder(folder_of(&path))
         };
         let outcome = attempt();
         written.push(path);
@@ -204,20 +208,6 @@ fn write_journals(files: &[(&Path, &Path)], home: &Path) -> Result<Vec<PathBuf>>
             Err(Error::caused("write", at_home.display().to_string(), error))
         }
     }
-}
-
-/// Makes names in a folder last. Where a system does not sync folders, it keeps their order itself.
-fn sync_folder(folder: &Path) -> io::Result<()> {
-    faults::step()?;
-    #[cfg(unix)]
-    {
-        let synced = File::open(folder).and_then(|folder| folder.sync_all());
-        // Some network file systems refuse it.
-        synced.or_else(|error| if error.kind() == io::ErrorKind::InvalidInput { Ok(()) } else { Err(error) })?;
-    }
-    #[cfg(not(unix))]
-    let _ = folder;
-    Ok(())
 }
 
 /// Whether a publication into a folder is under way, or was when its run was killed.
@@ -271,7 +261,7 @@ fn complete(journal: &Path, locked: bool) -> io::Result<()> {
         Some(Journal::Files(files)) => {
             files.iter().try_for_each(|entry| entry.finish(home))?;
             for entry in &files {
-                sync_folder(entry.folder(home))?;
+                durable::folder(entry.folder(home))?;
             }
         }
         Some(Journal::SeeAlso(other)) if is_journal(Path::new(&other), locked) && Path::new(&other).exists() => {

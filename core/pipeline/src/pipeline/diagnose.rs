@@ -32,6 +32,7 @@ use runout_closed_loop::{
 };
 use runout_error::{Error, ErrorKind, Result};
 use runout_evaluate::{EvaluatedStation, Group};
+use runout_numerics::threads;
 use runout_turning::station::StationResult;
 use runout_turning::{profile::Profile, separation::Quantity};
 
@@ -136,14 +137,14 @@ fn diagnose_turns(
     let (mut as_declared, mut turns) = (DeclaredStations::default(), TurnsOfAll::default());
     let (radius_mm, several) = (line.rig.part_radius_mm, stations.len() > 1);
     let looked_at = pipeline.evaluate.first_ront();
+    // Before is what a run gives, which leaves known effects and names of stations alone.
+    if settings.known.is_empty() {
+        let separated = threads::spread(&stations, |station| separate(separator, station, line.rig));
+        found.before = separated.into_iter().collect::<Result<_>>()?;
+    }
     let solved = found.before.into_iter().zip(found.after).zip(as_named);
     for (index, (station, ((before, after), as_named))) in stations.into_iter().zip(solved).enumerate() {
-        // Before is what a run gives, which leaves known effects and names of stations alone.
-        let before = match as_named {
-            Some(named) => named,
-            None if settings.known.is_empty() => separate(separator, &station, line.rig)?,
-            None => before,
-        };
+        let before = as_named.unwrap_or(before);
         let angles = station.profiles.first().map_or(0, |profile| profile.samples_per_rev);
         let truth = recording.truth(index)?;
         let complete = |separation, profiles, evaluate| {
@@ -151,8 +152,10 @@ fn diagnose_turns(
             let result = StationResult { station: name, z_mm: station.z_mm, angles, separation, profiles, truth };
             EvaluatedStation::of(result, evaluate, radius_mm, Some(line.rig), recording.stations().len())
         };
-        let declared = complete(before, Vec::new(), &looked_at);
-        let found = complete(after, station.profiles.clone(), &pipeline.evaluate);
+        let (declared, found) = threads::both(
+            || complete(before, Vec::new(), &looked_at),
+            || complete(after, station.profiles.clone(), &pipeline.evaluate),
+        );
         diagnosis.moved.extend(moved::moved(&declared, &found, &looked_at, radius_mm, several));
         for (errors, EvaluatedStation { result, .. }) in errors.iter_mut().zip([&declared, &found]) {
             let forms = (0..result.separation.sections.len()).map(Quantity::Form);

@@ -31,25 +31,28 @@ const STUCK: usize = 40;
 const BETWEEN_UNITS: f64 = 1e3;
 const USUAL_RATIO: f64 = 3.0;
 
-/// Parts of one measurement (sets, setups, diagonals) of which one is a thousand times larger or smaller than the others, each by its name and size:
-/// its numbers are in another unit.
+/// Parts of one measurement (sets, setups, diagonals) of which some are a thousand times larger or smaller than all others, each by its name and
+/// size: their numbers are in another unit. `remedy` says what to do.
 #[must_use]
-pub fn unlike_units(parts: &[(String, f64)]) -> Option<Check> {
+pub fn unlike_units(parts: &[(String, f64)], remedy: &str) -> Option<Check> {
     let near = |ratio: f64| (BETWEEN_UNITS / USUAL_RATIO..BETWEEN_UNITS * USUAL_RATIO).contains(&ratio);
-    let odd = parts.iter().enumerate().find_map(|(at, (name, size))| {
-        let ratios = || parts.iter().enumerate().filter(|(other, _)| *other != at).map(|(_, one)| size / one.1);
-        let nearest = ratios().min_by(|a, b| a.ln().abs().total_cmp(&b.ln().abs()))?;
-        (ratios().all(near) || ratios().all(|ratio| near(ratio.recip()))).then_some((name, nearest))
-    });
-    let (name, ratio) = odd?;
-    let found = || {
-        let (times, how) = if ratio > 1.0 { (ratio, "larger") } else { (ratio.recip(), "smaller") };
-        let beside = if parts.len() > 2 { "the others" } else { "the other one" };
+    let mut sorted: Vec<&(String, f64)> = parts.iter().collect();
+    sorted.sort_by(|a, b| a.1.total_cmp(&b.1));
+    let nearest = |cut: usize| sorted[cut].1 / sorted[cut - 1].1;
+    let farthest = sorted.last()?.1 / sorted[0].1;
+    let cut = (1..sorted.len()).find(|cut| near(nearest(*cut)) && near(farthest))?;
+    let (low, high) = sorted.split_at(cut);
+    let (odd, others, how) = if low.len() < high.len() { (low, high, "smaller") } else { (high, low, "larger") };
+    let names = |parts: &[&(String, f64)]| parts.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>().join(", ");
+    let finding = || {
         format!(
-            "the readings of {name} are {times:.0} times {how} than those of {beside}: one has another unit (millimetres, µm, nanometres); convert its file"
+            "the readings of {} are {:.0} times {how} than those of {}: some have another unit (millimetres, µm, nanometres): {remedy}",
+            names(odd),
+            nearest(cut),
+            names(others)
         )
     };
-    Some(Check::new(Test::Measured, format!("unit of {name}"), ratio, &[], 0.0).finding(found))
+    Some(Check::new(Test::Measured, format!("unit of {}", names(odd)), nearest(cut), &[], 0.0).finding(finding))
 }
 
 /// Refuses numbers that are nothing that was measured.
@@ -282,12 +285,14 @@ mod tests {
         assert!(stuck.len() == 1 && stuck[0].contains("80 rows, from row 121 on"), "{stuck:?}");
         let equal = findings(reading, reading, 200);
         assert!(equal.len() == 1 && equal[0].contains("`dx_mm` and `dz_mm` are equal"), "{equal:?}");
-        let of = |size: f64| unlike_units(&[("set 1".into(), 1.1), ("set 2".into(), size), ("set 3".into(), 0.8)]);
-        assert!(
-            of(950.0)
-                .is_some_and(|check| check.finding.contains("set 2 are 864 times larger than those of the others"))
-        );
-        assert!(of(1e-3).is_some_and(|check| check.finding.contains("smaller")) && of(25.0).is_none());
+        let of = |sizes: &[f64]| {
+            let parts: Vec<_> = sizes.iter().zip(1..).map(|(size, set)| (format!("set {set}"), *size)).collect();
+            unlike_units(&parts, "convert their file").map(|check| check.finding).unwrap_or_default()
+        };
+        assert!(of(&[1.1, 950.0, 0.8]).contains("set 2 are 864 times larger than those of set 3, set 1: some"));
+        assert!(of(&[1.1, 1e-3, 0.8]).contains("set 2 are 800 times smaller") && of(&[1.1, 25.0, 0.8]).is_empty());
+        assert!(of(&[1.1, 950.0, 800.0, 0.8]).contains("set 3, set 2 are 727 times larger than those of set 4, set 1"));
+        assert!(of(&[1.1]).is_empty() && of(&[1.1, 0.0]).is_empty() && of(&[1.1, f64::NAN]).is_empty());
         let dead = findings(reading, |_| 0.0123, 200);
         assert!(dead.len() == 1 && dead[0].contains("`dz_mm` is 0.0123 in every row"), "{dead:?}");
         assert_eq!(findings(|_| 0.0, |_| 0.0, 200), [""; 0]);

@@ -206,6 +206,22 @@ pub enum SimulatedEffect {
         #[serde(default)]
         declared: bool,
     },
+    /// The map is turned about its normal, by an angle from the machine's x to its own about x = y = 0.
+    MapRotation {
+        /// The angle, in µrad.
+        angle_urad: f64,
+        /// Whether the pipeline declares it.
+        #[serde(default)]
+        declared: bool,
+    },
+    /// The radius of the cutter is not the declared one.
+    CutterRadius {
+        /// Actual less declared radius, in mm.
+        change_mm: f64,
+        /// Whether the pipeline declares it.
+        #[serde(default)]
+        declared: bool,
+    },
     /// A groove along a straight line: no effect of the closed loop.
     Scratch {
         /// Where it begins, in mm.
@@ -228,6 +244,8 @@ pub enum SimulatedEffect {
     },
 }
 
+/// Angle of a map about its normal, at most.
+const MOST_ROTATION_URAD: f64 = 1e5;
 /// Orders of table straightness.
 const ORDERS: std::ops::RangeInclusive<usize> = 2..=5;
 
@@ -278,7 +296,7 @@ impl FlyCuttingScenario {
         }
         let effects = self.effect.iter().enumerate();
         effects.into_iter().try_for_each(|(index, effect)| {
-            effect.checked(nose_radius_mm).map_err(|fault| fault.under_item("effect", index))
+            effect.checked(&self.cut, &self.grid).map_err(|fault| fault.under_item("effect", index))
         })
     }
 }
@@ -307,7 +325,8 @@ impl GridConfig {
 }
 
 impl SimulatedEffect {
-    fn checked(&self, nose_radius_mm: f64) -> Result<(), Fault> {
+    fn checked(&self, cut: &CutConfig, grid: &GridConfig) -> Result<(), Fault> {
+        let nose_radius_mm = cut.nose_radius_mm;
         match self {
             Self::SpindleLine {
                 frequency_hz,
@@ -341,6 +360,15 @@ impl SimulatedEffect {
             Self::NoseRadius { change_mm, .. } => {
                 let problem = format!("a change of {change_mm} mm leaves nothing of a radius of {nose_radius_mm} mm");
                 Err(Fault::at("change_mm", problem))
+            }
+            Self::MapRotation { angle_urad, .. } if angle_urad.abs() <= MOST_ROTATION_URAD => Ok(()),
+            Self::MapRotation { angle_urad, .. } => {
+                let problem = format!("expected at most {MOST_ROTATION_URAD} µrad, found {angle_urad}");
+                Err(Fault::at("angle_urad", problem))
+            }
+            Self::CutterRadius { change_mm, .. } => {
+                let cutter_radius_mm = cut.cutter_radius_mm + change_mm;
+                above_zero("change_mm", "mm", cutter_radius_mm).and(grid.checked(cutter_radius_mm))
             }
             Self::Scratch { width_mm, depth_nm, .. } => {
                 above_zero("width_mm", "mm", *width_mm).and(finite("depth_nm", *depth_nm))

@@ -18,7 +18,17 @@ pub(super) fn cut(machine: &Machine, grid: &GridConfig) -> Vec<f64> {
     let mut heights = Vec::with_capacity(grid.rows * grid.columns);
     for row in 0..grid.rows {
         let y_mm = grid.origin_y_mm + grid.step_y_mm * row as f64;
-        cut_row(machine, grid, y_mm, &mut heights);
+        if machine.rotation == 0.0 {
+            cut_row(machine, grid, y_mm, &mut heights);
+            continue;
+        }
+        let (sine, cosine) = machine.rotation.sin_cos();
+        for column in 0..grid.columns {
+            let x_mm = grid.origin_x_mm + grid.step_x_mm * column as f64;
+            let origin_x_mm = x_mm * cosine - y_mm * sine;
+            let point = GridConfig { columns: 1, origin_x_mm, ..grid.clone() };
+            cut_row(machine, &point, x_mm * sine + y_mm * cosine, &mut heights);
+        }
     }
     heights
 }

@@ -12,6 +12,8 @@ use super::{
 pub(super) struct Machine {
     pub nose_radius_mm: f64,
     pub cutter_radius_mm: f64,
+    /// Angle of the map, in rad.
+    pub rotation: f64,
     /// Speed of the feed, in mm/s.
     feed_mm_per_s: f64,
     /// Turns per second.
@@ -48,6 +50,7 @@ impl Machine {
         let mut machine = Self {
             nose_radius_mm: cut.nose_radius_mm,
             cutter_radius_mm: cut.cutter_radius_mm,
+            rotation: 0.0,
             feed_mm_per_s: 1e-3 * cut.feed_um_per_rev * turns_per_s,
             turns_per_s,
             waves: Vec::new(),
@@ -91,6 +94,8 @@ impl Machine {
                     machine.feed_mm_per_s *= 1.0 + 1e-6 * scale_um_per_m;
                 }
                 SimulatedEffect::NoseRadius { change_mm, .. } => machine.nose_radius_mm += change_mm,
+                SimulatedEffect::MapRotation { angle_urad, .. } => machine.rotation += 1e-6 * angle_urad,
+                SimulatedEffect::CutterRadius { change_mm, .. } => machine.cutter_radius_mm += change_mm,
                 SimulatedEffect::WorkpieceTilt { .. }
                 | SimulatedEffect::Scratch { .. }
                 | SimulatedEffect::Pit { .. } => {}

@@ -12,12 +12,13 @@ use runout_core::{
         evidence::{Group, far_worse},
     },
     consistency::{Check, Test, linear},
+    numerics::threads,
     separation::{Quantity, Residual, Separation},
     stage::Station,
 };
 
 use super::{
-    data::{self, Shared},
+    data::{self, Shared, StationData},
     projection::project_some,
     remainder::remainder,
     solved::Solved,
@@ -48,8 +49,7 @@ impl SpindleFit {
             return Err(Error::new("apply", "effects", "their values are beyond all bounds").of(ErrorKind::Numerical));
         }
         let layout = shared.layout.altered(&alterations);
-        let stations: Vec<Solved> =
-            shared.data.iter().map(|data| Solved::new(&shared, data, &layout, &alterations)).collect();
+        let stations = threads::spread(&shared.data, |data| Solved::new(&shared, data, &layout, &alterations));
         // The declared model's fit is what it is; values at which no solution settles are not those of an effect.
         if !applied.is_empty() && stations.iter().any(|solved| solved.estimate.is_unsettled()) {
             return Err(Error::new("apply", "effects", "no solution settles at their values").of(ErrorKind::Numerical));
@@ -129,15 +129,13 @@ impl SpindleFit {
         self.stations.iter().map(|station| station.corrected.max_order).max().unwrap_or(0)
     }
 
-    fn predicted(&self, station: usize) -> Predicted<'_> {
-        let solved = &self.stations[station];
-        let readings = &solved.corrected;
-        Predicted::new(&self.layout, &solved.alterations, &solved.estimate, readings)
+    fn predicted<'a>(&'a self, solved: &'a Solved) -> Predicted<'a> {
+        Predicted::new(&self.layout, &solved.alterations, &solved.estimate, &solved.corrected)
     }
 
     fn partials(&self, effect: usize, station: usize) -> Vec<Vec<Complex64>> {
         let place = &self.shared.places[effect];
-        self.shared.kind(effect).partials(place.index, &self.predicted(station))
+        self.shared.kind(effect).partials(place.index, &self.predicted(&self.stations[station]))
     }
 
     /// Form and motion, one entry a station.
@@ -184,13 +182,13 @@ impl SpindleFit {
     /// Without what is mixed with it.
     fn own_separations(&self, stations: &[Station]) -> Vec<Separation> {
         let solver = self.shared.solver(&self.layout, &self.alterations);
-        let each = self.stations.iter().zip(stations).map(|(solved, station)| {
+        let each: Vec<(&Solved, &Station)> = self.stations.iter().zip(stations).collect();
+        threads::spread(&each, |(solved, station)| {
             let propagation = solved.stated.as_ref().or(solved.propagation.as_ref());
             let by_reading = by_reading(&solved.operators, &solved.corrected, &solved.linear);
             let residual = Residual { by_reading, ..solved.residual.clone() };
             solver.report(station, &solved.operators, &solved.estimate, propagation, residual)
-        });
-        each.collect()
+        })
     }
 }
 
@@ -204,19 +202,26 @@ impl Fit for SpindleFit {
         let mut signature = vec![Vec::with_capacity(self.remainder.residual.len()); count];
         let place = &self.shared.places[effect];
         let kind = self.shared.kind(effect);
-        for (index, solved) in self.stations.iter().enumerate() {
-            for (parameter, (partial, column)) in self.partials(effect, index).iter().zip(&mut signature).enumerate() {
+        let stations: Vec<(&Solved, &StationData)> = self.stations.iter().zip(&self.shared.data).collect();
+        let of_station = |(solved, data): &(&Solved, &StationData)| {
+            let partials = kind.partials(place.index, &self.predicted(solved));
+            let columns = partials.iter().enumerate().map(|(parameter, partial)| {
+                let mut column = Vec::new();
                 // What the model predicts more of, the residual has less of.
                 project_some(&solved.whitened, partial, solved.corrected.count, |value| {
                     column.extend([-value.re, -value.im]);
                 });
-                let creeps = self.shared.data[index].creeps.iter();
-                column.extend(creeps.map(|(sensor, _, std)| {
+                column.extend(data.creeps.iter().map(|(sensor, _, std)| {
                     let creep = kind.creep_partials(place.index, *sensor).get(parameter).copied();
                     -creep.unwrap_or(0.0) / std
                 }));
-                column.extend(self.shared.data[index].seen.lines.found.iter().map(|_| 0.0));
-            }
+                column.extend(data.seen.lines.found.iter().map(|_| 0.0));
+                column
+            });
+            columns.collect::<Vec<Vec<f64>>>()
+        };
+        for columns in threads::spread(&stations, of_station) {
+            signature.iter_mut().zip(columns).for_each(|(column, of_station)| column.extend(of_station));
         }
         signature
     }

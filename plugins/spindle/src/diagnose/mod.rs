@@ -26,6 +26,7 @@ use runout_core::{
         self, Effect, Fit, Model, Setting, Settings,
         diagnosis::{Blind, Estimated, LostOrders, Unexplained, Verdict},
     },
+    numerics::threads,
     separation::NOTHING_SEPARATED,
     stage::{Station, StationDiagnosis},
 };
@@ -69,12 +70,14 @@ impl SpindleModel {
         let places = places(&effects, &selection, &layout, second_order);
         let creeping = drift::creeping(&selection, stations);
         let seen = stations.iter().zip(creeping);
-        let seen =
-            seen.map(|(station, creeping)| Arc::new(TurnObservations::new(&selection, &layout, station, creeping)));
-        let seen: Vec<Arc<TurnObservations>> = seen.collect();
+        let seen = seen.map(|(station, creeping)| {
+            let seen = TurnObservations::new(&selection, &layout, station, creeping);
+            (station, Arc::new(seen))
+        });
+        let seen: Vec<(&Station, Arc<TurnObservations>)> = seen.collect();
         let each = |data: fn(&Selection, &Layout, &Station, &Arc<TurnObservations>) -> Result<StationData>| {
-            let stations = stations.iter().zip(&seen);
-            stations.map(|(station, seen)| data(&selection, &layout, station, seen)).collect::<Result<Vec<_>>>()
+            let all = threads::spread(&seen, |(station, seen)| data(&selection, &layout, station, seen));
+            all.into_iter().collect::<Result<Vec<_>>>()
         };
         let (all, split) = (each(StationData::whole)?, each(StationData::split)?);
         let whole = Shared {

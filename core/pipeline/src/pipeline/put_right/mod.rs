@@ -10,6 +10,7 @@ use runout_closed_loop::{
     diagnosis::{Added, Step},
 };
 use runout_error::Result;
+use runout_numerics::threads;
 use runout_turning::{rig::Rig, separation::Separation};
 
 use crate::{
@@ -75,7 +76,7 @@ pub fn put_right(
         return Ok(PutRight::default());
     }
     let left_of = |station: &Station| Ok(Left::of(&separator.separate(station)?));
-    let mut left = stations.iter().map(left_of).collect::<Result<Vec<Left>>>()?;
+    let mut left = threads::spread(stations, left_of).into_iter().collect::<Result<Vec<Left>>>()?;
     let mut found = PutRight { declared: vec![None; stations.len()], ..PutRight::default() };
     let mut declared = left.clone();
     for (station, as_marked) in marks::as_marked(stations, &recounted) {
