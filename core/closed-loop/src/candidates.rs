@@ -9,7 +9,7 @@ use super::{
     judgement::independent,
     search::Tracing,
 };
-use runout_numerics::least_squares::dot;
+use runout_numerics::{least_squares::dot, threads};
 
 /// Candidates of which a joint refit is tried, and the least share of the best linear gain that they must promise.
 const SHORTLIST: (usize, f64) = (6, 0.2);
@@ -50,6 +50,11 @@ impl<M: Model> Tracing<'_, M> {
         (!trial.ends_at_bound).then(|| (effect, trial.remainder_only(), evidence))
     }
 
+    /// Does the same with each of some candidates, at once where a fit leaves processors free.
+    pub(super) fn side_by_side<I: Sync, T: Send>(&self, items: &[I], work: impl Fn(&I) -> T + Sync) -> Vec<T> {
+        threads::spread(items, if self.model.is_spread() { usize::MAX } else { 2 }, work)
+    }
+
     /// Candidates with what each lowers χ² by, to first order or from where its fit starts, the most first.
     pub(super) fn ranked(
         &self,
@@ -59,19 +64,15 @@ impl<M: Model> Tracing<'_, M> {
         starts: &BTreeMap<usize, Vec<f64>>,
     ) -> Vec<(usize, f64)> {
         let before = current.fit.remainder();
-        let mut ranked: Vec<(usize, f64)> = candidates
-            .iter()
-            .map(|effect| {
-                if self.model.effects()[*effect].parameters.is_empty() {
-                    return (*effect, before.chi2() - self.with(current, *effect, Vec::new()));
-                }
-                let columns = independent(current.fit.signature(*effect), basis);
-                let linear: f64 = columns.iter().map(|column| dot(column, &before.residual).powi(2)).sum();
-                let started =
-                    starts.get(effect).map(|values| before.chi2() - self.with(current, *effect, values.clone()));
-                (*effect, linear.max(started.unwrap_or(linear)))
-            })
-            .collect();
+        let mut ranked = self.side_by_side(candidates, |effect| {
+            if self.model.effects()[*effect].parameters.is_empty() {
+                return (*effect, before.chi2() - self.with(current, *effect, Vec::new()));
+            }
+            let columns = independent(current.fit.signature(*effect), basis);
+            let linear: f64 = columns.iter().map(|column| dot(column, &before.residual).powi(2)).sum();
+            let started = starts.get(effect).map(|values| before.chi2() - self.with(current, *effect, values.clone()));
+            (*effect, linear.max(started.unwrap_or(linear)))
+        });
         ranked.sort_by(|a, b| b.1.total_cmp(&a.1));
         ranked
     }

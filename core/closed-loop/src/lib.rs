@@ -62,7 +62,7 @@ use runout_consistency::{Check, Partition, Structure};
 use runout_error::Result;
 
 /// A declared model of a measurement, and what it could lack.
-pub trait Model {
+pub trait Model: Sync {
     /// A fit of it.
     type Fit: Fit;
 
@@ -96,15 +96,20 @@ pub trait Model {
         None
     }
 
-    /// Values of an effect that its search begins at, beside what is applied; all 0 without them. A model that is far from
+    /// Values of an effect that its search begins at, beside what is applied, and its fit; all 0 without them. A model that is far from
     /// linear in an effect searches them itself.
-    fn start(&self, _effect: usize, _applied: &[Setting]) -> Option<Vec<f64>> {
+    fn start(&self, _effect: usize, _fit: &Self::Fit, _applied: &[Setting]) -> Option<Vec<f64>> {
         None
     }
 
     /// The same model on all data, for the final results: what the loop holds out is part of them.
     fn whole(&self) -> &Self {
         self
+    }
+
+    /// Whether a fit takes all processors itself; else candidates are tried side by side.
+    fn is_spread(&self) -> bool {
+        false
     }
 
     /// What would declare an effect at the values that are `applied`: lines of TOML, a key of the measurement's declaration
@@ -146,7 +151,7 @@ pub trait Model {
 }
 
 /// A model fitted to its data.
-pub trait Fit {
+pub trait Fit: Sync {
     /// What is left.
     fn remainder(&self) -> &Remainder;
 

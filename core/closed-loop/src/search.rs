@@ -237,10 +237,9 @@ impl<M: Model> Tracing<'_, M> {
         let active: Vec<Vec<f64>> =
             current.settings[fixed..].iter().flat_map(|setting| current.fit.signature(setting.effect)).collect();
         let basis = orthonormal(active, &[], INDEPENDENT);
-        let starts: BTreeMap<usize, Vec<f64>> = candidates
-            .iter()
-            .filter_map(|effect| Some((*effect, self.model.start(*effect, &current.settings)?)))
-            .collect();
+        let starts = self.side_by_side(candidates, |effect| self.model.start(*effect, &current.fit, &current.settings));
+        let starts = candidates.iter().zip(starts).filter_map(|(effect, start)| Some((*effect, start?)));
+        let starts: BTreeMap<usize, Vec<f64>> = starts.collect();
         let ranked = self.ranked(current, candidates, &basis, &starts);
         let try_out = |tracing: &Self, effect: usize, gain: f64| {
             tracing.trial(current, [effect, count], starts.get(&effect), gain)
@@ -256,8 +255,8 @@ impl<M: Model> Tracing<'_, M> {
         beside.sort_by(|a, b| b.1.total_cmp(&a.1));
         let beside: Vec<usize> = beside.into_iter().take(BESIDE_CORRELATED).map(|(effect, _)| effect).collect();
         let [listed, unlisted] = self.listed(ranked, &beside);
-        let mut trials: Vec<(usize, Refit<Remainder>, Evidence)> =
-            listed.into_iter().filter_map(|(effect, gain)| try_out(self, effect, gain)).collect();
+        let trials = self.side_by_side(&listed, |(effect, gain)| try_out(self, *effect, *gain));
+        let mut trials: Vec<(usize, Refit<Remainder>, Evidence)> = trials.into_iter().flatten().collect();
         let best = trials.iter().map(|(_, _, evidence)| evidence.delta_bic).fold(f64::INFINITY, f64::min);
         // Of those that are equal up to rounding, the one that the model names first.
         let place = |bic: f64| if bic - best <= SAME * best.abs() { best } else { bic };

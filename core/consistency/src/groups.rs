@@ -88,7 +88,7 @@ const CONSTANT: f64 = 1e-6;
 const LEAST_FREEDOM: f64 = 0.5;
 
 /// The least likely group as a [`Check`], and every other one that is a finding: `what` the groups are, in the plural, `why` what a group
-/// below the others may come from. Two groups are one comparison.
+/// below the others may come from. What is a finding is none of the others for those that are judged after it.
 #[must_use]
 pub fn alike(what: &str, groups: &[Group], level: Level, why: &str) -> Vec<Check> {
     said(what, groups, compared(groups, level), level, why)
@@ -97,29 +97,40 @@ pub fn alike(what: &str, groups: &[Group], level: Level, why: &str) -> Vec<Check
 /// The same of groups that are [`compared`] already.
 #[must_use]
 pub fn said(what: &str, groups: &[Group], mut all: Vec<Compared>, level: Level, why: &str) -> Vec<Check> {
-    all.sort_by(|a, b| a.p.total_cmp(&b.p).then(b.ratio.total_cmp(&a.ratio)).then(a.group.cmp(&b.group)));
-    let is_pair = level == Level::Others && all.len() == 2;
-    if is_pair && all[1].ratio < CONSTANT {
-        all.reverse();
-    }
+    let (count, mut left, mut checks) = (all.len(), groups.to_vec(), Vec::new());
     let others = if level == Level::Others { "the others" } else { "the noise" };
-    let found = all.iter().enumerate().filter(|(rank, one)| *rank == 0 || (one.p < FINDING && !is_pair));
-    let checks = found.map(|(_, one)| {
+    while let Some(one) = least_likely(&all, level) {
+        if !checks.is_empty() && one.p >= FINDING {
+            break;
+        }
         let name = &groups[one.group].name;
         let size = one.ratio.max(0.0).sqrt();
-        Check::new(Test::Alike, name, one.ratio, &one.dof, one.p).finding(|| {
+        checks.push(Check::new(Test::Alike, name, one.ratio, &one.dof, one.p).finding(|| {
             if one.ratio > 1.0 {
-                format!("{name} has {size:.1} times the residual of {others} (of {} {what})", all.len())
+                format!("{name} has {size:.1} times the residual of {others} (of {count} {what})")
             } else {
-                format!(
-                    "{name} has only {} times the residual of {others} (of {} {what}): {why}",
-                    significant(size, 2),
-                    all.len()
-                )
+                let size = significant(size, 2);
+                format!("{name} has only {size} times the residual of {others} (of {count} {what}): {why}")
             }
-        })
-    });
-    checks.collect()
+        }));
+        left[one.group].freedom = 0.0;
+        if level == Level::Others {
+            all = compared(&left, level);
+        } else {
+            all.retain(|other| other.group != one.group);
+        }
+    }
+    checks
+}
+
+/// Of two groups, which are one comparison, the larger one unless the other is constant.
+fn least_likely(all: &[Compared], level: Level) -> Option<Compared> {
+    let least = all
+        .iter()
+        .copied()
+        .min_by(|a, b| a.p.total_cmp(&b.p).then(b.ratio.total_cmp(&a.ratio)).then(a.group.cmp(&b.group)))?;
+    let constant = all.iter().copied().find(|one| one.ratio < CONSTANT);
+    if level == Level::Others && all.len() == 2 { constant.or(Some(least)) } else { Some(least) }
 }
 
 #[cfg(test)]
@@ -151,6 +162,10 @@ mod tests {
             let small = found(&mut random, level, &|group| if group == 2 { 0.3 } else { 2.0 });
             assert!(clean < 0.0125 && large > 0.95 && small > 0.95, "{level:?}: {clean} {large} {small}");
         }
+        // One that is far larger makes no constant ones of the others.
+        let one = groups(&mut random, 6, 12, &|group| if group == 2 { 300.0 } else { 2.0 });
+        let checks = alike("parts", &one, Level::Others, "copied");
+        assert!(checks.len() == 1 && checks[0].finding.starts_with("part 2 has"), "{checks:?}");
         let checks =
             alike("parts", &groups(&mut random, 6, 12, &|group| if group == 1 { 0.0 } else { 1.0 }), known, "copied");
         assert!(checks[0].finding.contains("copied") && checks[0].did == Action::Verdict, "{checks:?}");

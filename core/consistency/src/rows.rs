@@ -63,40 +63,31 @@ pub fn unlike(residual: &[f64], basis: &[Vec<f64>]) -> Option<Rows> {
         return None;
     }
     let all = squares / dof as f64;
-    let columns = DMatrix::from_fn(count, basis.len(), |row, column| basis[column][row]);
-    let values = DVector::from_column_slice(residual);
-    let suspects = suspects(residual, basis, dof);
-    let kept = DVector::from_fn(count, |row, _| if suspects.contains(&row) { 0.0 } else { 1.0 });
-    let fitted = weighted(&columns, &values, &kept)?;
+    let Suspects { rows: suspects, left, free } = suspects(residual, basis, dof);
     let below = (dof - suspects.len()) as f64;
-    let off = &values - fitted;
-    let squares: f64 = off.iter().zip(kept.iter()).map(|(value, kept)| kept * value * value).sum();
-    let noise = (squares / below).max(of_resolution(residual.iter().copied())).sqrt();
-    // Variance of a suspect's prediction, in units of the noise.
-    let normal =
-        columns.transpose() * DMatrix::from_fn(count, basis.len(), |row, column| kept[row] * columns[(row, column)]);
-    let inverse = normal.try_inverse()?;
-    let predicted = |row: usize| {
-        let own = columns.row(row);
-        (own * &inverse * own.transpose())[(0, 0)]
-    };
-    let mut judged: Vec<(usize, f64)> =
-        suspects.iter().map(|row| (*row, off[*row].abs() / (noise * (1.0 + predicted(*row)).sqrt()))).collect();
+    let noise = (dot(&left, &left) / below).max(of_resolution(residual.iter().copied())).sqrt();
+    // Of suspects: what each is off by from the fit without them is (1 − H)⁻¹r, with the variance (1 − H)⁻¹ in units of the noise.
+    let among = DMatrix::from_fn(suspects.len(), suspects.len(), |one, other| {
+        let shared: f64 = basis.iter().map(|column| column[suspects[one]] * column[suspects[other]]).sum();
+        if one == other { 1.0 - shared } else { -shared }
+    });
+    let variance = among.cholesky()?.inverse();
+    let off = &variance * DVector::from_iterator(suspects.len(), suspects.iter().map(|row| residual[*row]));
+    let studentised = |place: usize| off[place].abs() / (noise * variance[(place, place)].sqrt());
+    let mut judged: Vec<(usize, f64)> = (0..suspects.len()).map(|place| (place, studentised(place))).collect();
     judged.sort_by(|a, b| b.1.total_cmp(&a.1));
     // Behind the last suspect is the farthest of the others.
     let others = (0..count).filter(|row| !suspects.contains(row));
-    let next = others
-        .map(|row| off[row].abs() / (noise * (1.0 - predicted(row)).max(f64::EPSILON).sqrt()))
-        .fold(0.0, f64::max);
+    let next = others.map(|row| left[row].abs() / (noise * free[row].max(f64::EPSILON).sqrt())).fold(0.0, f64::max);
     let tail = |t: f64| (f_tail(t * t, 1.0, below) * count as f64).min(1.0);
     let behind = |rank: usize| judged.get(rank).map_or(next, |(_, t)| *t);
     let apart = |rank: usize| judged[rank - 1].1 > (1.0 + (rank as f64).sqrt().recip()) * behind(rank);
     let named = (1..=judged.len()).rev().find(|rank| apart(*rank) && tail(judged[*rank - 1].1) < FINDING).unwrap_or(0);
-    let rows: Vec<usize> = judged[..named].iter().map(|(row, _)| *row).collect();
+    let named = judged[..named].iter().map(|(place, _)| *place);
     let farthest = judged.first().map_or(0.0, |(_, t)| *t);
     Some(Rows {
-        off_by: rows.iter().map(|row| off[*row]).collect(),
-        rows,
+        off_by: named.clone().map(|place| off[place]).collect(),
+        rows: named.map(|place| suspects[place]).collect(),
         farthest,
         p: tail(farthest),
         dof: below,
@@ -179,9 +170,17 @@ impl Repeated {
     }
 }
 
-/// Readings that a fit does better without, one after the other: each is that whose own column takes most of the residual, and the last one
-/// is the last whose chance is small. At least one.
-fn suspects(residual: &[f64], basis: &[Vec<f64>], dof: usize) -> Vec<usize> {
+/// Readings that a fit does better without.
+struct Suspects {
+    rows: Vec<usize>,
+    /// What the fit without them leaves of the others; 0 of them.
+    left: Vec<f64>,
+    /// Squared length of each reading's column outside that fit: the variance of what is left, in units of the noise.
+    free: Vec<f64>,
+}
+
+/// One after the other: each is that whose own column takes most of the residual, and the last one is the last whose chance is small. At least one.
+fn suspects(residual: &[f64], basis: &[Vec<f64>], dof: usize) -> Suspects {
     let count = residual.len();
     let most = ((MOST * count as f64).ceil() as usize).min(dof.saturating_sub(FEWEST / 2)).clamp(1, MOST_SUSPECTS);
     let mut left = residual.to_vec();
@@ -189,7 +188,7 @@ fn suspects(residual: &[f64], basis: &[Vec<f64>], dof: usize) -> Vec<usize> {
     let outside = |row: usize| 1.0 - basis.iter().map(|column| column[row] * column[row]).sum::<f64>();
     let mut free: Vec<f64> = (0..count).map(outside).collect();
     let (mut chosen, mut added): (Vec<usize>, Vec<Vec<f64>>) = (Vec::new(), Vec::new());
-    let mut last = 1;
+    let mut last = Suspects { rows: Vec::new(), left: left.clone(), free: free.clone() };
     while chosen.len() < most {
         let gain = |row: &usize| left[*row] * left[*row] / free[*row];
         let seen = (0..count).filter(|row| free[*row] > LEAST_FREE);
@@ -198,9 +197,6 @@ fn suspects(residual: &[f64], basis: &[Vec<f64>], dof: usize) -> Vec<usize> {
         let rest = (dot(&left, &left) - taken).max(0.0);
         let p = f_tail(taken / (rest / below).max(f64::MIN_POSITIVE), 1.0, below) * (count - chosen.len()) as f64;
         chosen.push(row);
-        if p < FINDING {
-            last = chosen.len();
-        }
         let mut direction = vec![0.0; count];
         direction[row] = 1.0;
         for column in basis.iter().chain(&added) {
@@ -215,21 +211,11 @@ fn suspects(residual: &[f64], basis: &[Vec<f64>], dof: usize) -> Vec<usize> {
             *free -= entry * entry;
         }
         added.push(direction);
+        if p < FINDING || last.rows.is_empty() {
+            last = Suspects { rows: chosen.clone(), left: left.clone(), free: free.clone() };
+        }
     }
-    chosen.truncate(last);
-    chosen
-}
-
-/// What a weighted fit of the columns makes of the values at every row.
-fn weighted(columns: &DMatrix<f64>, values: &DVector<f64>, weights: &DVector<f64>) -> Option<DVector<f64>> {
-    if columns.ncols() == 0 {
-        return Some(DVector::zeros(values.len()));
-    }
-    let scaled =
-        DMatrix::from_fn(columns.nrows(), columns.ncols(), |row, column| weights[row] * columns[(row, column)]);
-    let normal = columns.transpose() * &scaled;
-    let found = normal.cholesky()?.solve(&scaled.tr_mul(values));
-    Some(columns * found)
+    last
 }
 
 impl Rows {

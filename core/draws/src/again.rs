@@ -40,6 +40,12 @@ pub enum Truth {
     Least,
     /// What was found, with its noise: what is there is raised least.
     Most,
+    /// What was found with noise once more: noise may have hidden as much of what is there.
+    Hidden,
+}
+
+impl Truth {
+    const ALL: [Self; 3] = [Self::Least, Self::Most, Self::Hidden];
 }
 
 /// How far means are drawn together that have this variance, where noise has this share of it: what is left has the power without noise.
@@ -51,11 +57,10 @@ pub fn without_noise(variance: f64, of_noise: f64) -> f64 {
 /// What is known of values. `error` measures a truth again, and gives what the values are then off by.
 ///
 /// What an error is on average, noise has raised the value by: the interval takes it back (basic bootstrap: Davison, Hinkley, *Bootstrap
-/// Methods*, 1997, section 2.4). It contains those of both truths.
+/// Methods*, 1997, section 2.4). It contains those of all truths.
 pub fn measured_again(values: &[f64], seed: u64, error: impl Fn(Truth, &mut Draw) -> Vec<f64>) -> Vec<Uncertainty> {
     let mut draw = Draw::new(seed);
-    let errors =
-        [Truth::Least, Truth::Most].map(|truth| (0..DRAWS).map(|_| error(truth, &mut draw)).collect::<Vec<Vec<f64>>>());
+    let errors = Truth::ALL.map(|truth| (0..DRAWS).map(|_| error(truth, &mut draw)).collect::<Vec<Vec<f64>>>());
     let known = |(index, value): (usize, &f64)| {
         let (mut std, mut interval) = (0.0_f64, [f64::INFINITY, f64::NEG_INFINITY]);
         for errors in &errors {
@@ -66,7 +71,7 @@ pub fn measured_again(values: &[f64], seed: u64, error: impl Fn(Truth, &mut Draw
             let at = |share: f64| value - of[(share * (DRAWS - 1) as f64).round() as usize];
             interval = [interval[0].min(at(0.975)), interval[1].max(at(0.025))];
         }
-        Uncertainty::new(std, interval, 2 * DRAWS)
+        Uncertainty::new(std, interval, Truth::ALL.len() * DRAWS)
     };
     values.iter().enumerate().map(known).collect()
 }

@@ -4,17 +4,14 @@
 //! | --- | --- |
 //! | small and complex, many right-hand sides: an operator an order | [`PivotedQr`] |
 //! | real, and the rank is in question: what the data do not determine is lost | [`least_norm`] |
-//! | real and independent, models nested in each other | [`Leading`] |
-//! | columns that come one after the other, predictions of data left out | [`Basis`] |
+//! | columns that come one after the other, models nested in each other, predictions of data left out | [`Basis`] |
 //!
 //! All scale columns to norm 1 first, or compare with a column's own norm, so that units do not decide on the rank.
 
 mod basis;
-mod leading;
 mod least_norm;
 mod pivoted;
 
 pub use basis::{Basis, dot, norm, orthonormal};
-pub use leading::{Leading, Solution, solve};
 pub use least_norm::{LeastNorm, SINGULAR, least_norm};
 pub use pivoted::{PivotedQr, cholesky, invert_lower};

@@ -15,6 +15,13 @@ pub fn significant(value: f64, digits: usize) -> String {
     format!("{value:.decimals$}")
 }
 
+/// The same with its sign.
+#[must_use]
+pub fn signed(value: f64, digits: usize) -> String {
+    let sign = if value > 0.0 { "+" } else { "" };
+    format!("{sign}{}", significant(value, digits))
+}
+
 /// A value with as many decimals as its standard uncertainty (two significant digits) gives a meaning to.
 #[must_use]
 pub fn with_std(value: f64, std: Option<f64>) -> String {

@@ -4,12 +4,12 @@ use std::{
     cell::Cell,
     num::NonZero,
     panic::resume_unwind,
-    sync::LazyLock,
+    sync::{
+        LazyLock,
+        atomic::{AtomicUsize, Ordering},
+    },
     thread::{ScopedJoinHandle, available_parallelism, scope},
 };
-
-/// Items of which [`spread`] begins threads: a thread takes as long to begin as a short piece of work.
-const FEWEST: usize = 8;
 
 static PROCESSORS: LazyLock<usize> = LazyLock::new(|| available_parallelism().map_or(1, NonZero::get));
 
@@ -59,13 +59,26 @@ pub fn each<I: Send, T: Send>(items: impl IntoIterator<Item = I>, work: impl Fn(
     })
 }
 
-/// Does the same with each of many items, on a thread for each processor; what comes of it is in their order.
-pub fn spread<I: Sync, T: Send>(items: &[I], work: impl Fn(&I) -> T + Sync) -> Vec<T> {
-    if is_alone() || *PROCESSORS == 1 || items.len() < FEWEST {
+/// Does the same with each of many items, one after the other on a thread for each processor; what comes of it is in their order. All is done on this
+/// thread where there are fewer than `fewest`: a thread takes as long to begin as a short piece of work.
+pub fn spread<I: Sync, T: Send>(items: &[I], fewest: usize, work: impl Fn(&I) -> T + Sync) -> Vec<T> {
+    if is_alone() || *PROCESSORS == 1 || items.len() < fewest.max(2) {
         return items.iter().map(work).collect();
     }
-    let runs = items.chunks(items.len().div_ceil(*PROCESSORS));
-    each(runs, |run| alone(|| run.iter().map(&work).collect::<Vec<T>>())).into_iter().flatten().collect()
+    let next = AtomicUsize::new(0);
+    let worker = |_| {
+        alone(|| {
+            let mut done = Vec::new();
+            loop {
+                let place = next.fetch_add(1, Ordering::Relaxed);
+                let Some(item) = items.get(place) else { break done };
+                done.push((place, work(item)));
+            }
+        })
+    };
+    let mut done: Vec<(usize, T)> = each(0..items.len().min(*PROCESSORS), worker).into_iter().flatten().collect();
+    done.sort_unstable_by_key(|(place, _)| *place);
+    done.into_iter().map(|(_, one)| one).collect()
 }
 
 fn joined<T>(thread: ScopedJoinHandle<T>) -> T {
@@ -90,7 +103,7 @@ mod tests {
         assert!(other != here && own == here);
         assert_eq!(each(0..5, |item| 2 * item), [0, 2, 4, 6, 8]);
         let many: Vec<usize> = (0..101).collect();
-        assert_eq!(spread(&many, |item| *item), many);
-        assert!(alone(|| spread(&many, |_| current().id())).iter().all(|id| *id == here));
+        assert_eq!(spread(&many, 2, |item| *item), many);
+        assert!(alone(|| spread(&many, 2, |_| current().id())).iter().all(|id| *id == here));
     }
 }

@@ -5,10 +5,9 @@ use std::{
     ops::Range,
 };
 
-use nalgebra::{DMatrix, DVector};
 use runout_core::{
     Complex64,
-    numerics::least_squares::{Leading, Solution},
+    numerics::least_squares::{Basis, dot},
 };
 
 use crate::{
@@ -53,9 +52,11 @@ impl Harmonics {
     /// separates them from form: they are not in the variance. A covariance fitted to the residual would have to be carried to lower
     /// orders than it has, and calls the part's own high orders noise.
     ///
+    /// With them comes the basis of their columns.
+    ///
     /// # Errors
     /// When the points carry no order of roundness, in words.
-    pub(crate) fn fit(scan: &Scan, max_order: usize, about_mm: Option<f64>) -> Result<Self, String> {
+    pub(crate) fn fit(scan: &Scan, max_order: usize, about_mm: Option<f64>) -> Result<(Self, Basis), String> {
         let slopes = if about_mm.is_some() { SLOPES } else { 0 };
         let points = scan.len();
         let most = points.saturating_sub(slopes + 2) / 2;
@@ -63,16 +64,16 @@ impl Harmonics {
         if highest < LOWEST_ORDER {
             return Err(format!("{points} points do not determine orders 0 to {LOWEST_ORDER}"));
         }
-        let matrix = DMatrix::from_fn(points, slopes + 2 * highest + 1, |row, column| {
+        let entry = |column: usize, row: usize| {
             let (angle, z) = (scan.angle_rad[row], scan.z_mm[row]);
             match about_mm {
                 Some(about) if column < SLOPES => along(angle, z - about, column),
                 _ => basis(angle, column - slopes),
             }
-        });
-        let right = DVector::from_column_slice(&scan.deviation_um);
-        let factored = Leading::new(matrix.clone(), right.clone());
-        let (order, found) = carried(&factored, points, slopes, highest).ok_or_else(|| {
+        };
+        let columns = 0..slopes + 2 * highest + 1;
+        let basis = Basis::of(columns.map(|column| (0..points).map(|row| entry(column, row)).collect()).collect());
+        let (order, unit_variance) = carried(&basis, points, slopes).ok_or_else(|| {
             let [from, to] = widest_gap_deg(&scan.angle_rad);
             format!(
                 "its points do not determine orders 0 to {LOWEST_ORDER}; there is none between {from:.2}° and {to:.2}°"
@@ -80,17 +81,20 @@ impl Harmonics {
         })?;
         let limit = (order < max_order).then(|| limit(scan, order, highest));
         let columns = slopes + 2 * order + 1;
-        let residual = right - matrix.columns(0, columns) * DVector::from_column_slice(&found.values);
+        let basis = basis.first(columns);
+        let values = basis.coefficients(&scan.deviation_um);
+        let mut residual = scan.deviation_um.clone();
+        basis.remove_from(&mut residual);
         let dof = points - columns;
-        let variance = residual.norm_squared() / dof as f64 * correlation_factor(residual.as_slice());
-        let (sloped, values) = found.values.split_at(slopes);
-        let (sloped_unit, unit) = found.unit_variance.split_at(slopes);
+        let variance = dot(&residual, &residual) / dof as f64 * correlation_factor(&residual);
+        let (sloped, values) = values.split_at(slopes);
+        let (sloped_unit, unit) = unit_variance.split_at(slopes);
         let level = (Complex64::from(values[0]), variance * unit[0]);
         let pairs = values[1..].chunks_exact(2).zip(unit[1..].chunks_exact(2));
         // a cos nα + b sin nα = Re (a − ib) e^{inα}.
         let orders = pairs.map(|(value, unit)| (Complex64::new(value[0], -value[1]), variance * (unit[0] + unit[1])));
         let (coefficients, order_variance) = std::iter::once(level).chain(orders).unzip();
-        Ok(Self {
+        let found = Self {
             coefficients,
             variance: order_variance,
             slopes: about_mm.zip(<[f64; SLOPES]>::try_from(sloped).ok()),
@@ -98,13 +102,8 @@ impl Harmonics {
             limit,
             residual_rms_um: rms(residual.iter().copied()),
             dof,
-        })
-    }
-
-    /// Their columns at the points of a scan, without slopes along z.
-    pub(crate) fn columns(&self, scan: &Scan) -> Vec<Vec<f64>> {
-        let column = |column: usize| scan.angle_rad.iter().map(|angle| basis(*angle, column)).collect();
-        (0..2 * self.coefficients.len() - 1).map(column).collect()
+        };
+        Ok((found, basis))
     }
 
     /// The highest order.
@@ -129,28 +128,27 @@ impl Harmonics {
     }
 }
 
-/// The highest order up to `highest` whose model has no harmonic of more than [`WORST_NOISE_GAIN`], and its solution. More
-/// orders never lower a variance, so that halving finds it.
-fn carried(factored: &Leading, points: usize, slopes: usize, highest: usize) -> Option<(usize, Solution)> {
-    let solve = |order: usize| {
-        let found = factored.leading(slopes + 2 * order + 1)?;
-        let worst = found.unit_variance[slopes..].iter().fold(0.0_f64, |worst, variance| worst.max(*variance));
+/// The highest order whose model has no harmonic of more than [`WORST_NOISE_GAIN`], and the unit variances of its columns: more orders never lower one.
+fn carried(basis: &Basis, points: usize, slopes: usize) -> Option<(usize, Vec<f64>)> {
+    let inverse = basis.inverse();
+    let mut unit_variance = vec![0.0; inverse.len()];
+    let mut best = None;
+    for (column, entries) in inverse.iter().enumerate().take(basis.leading()) {
+        unit_variance.iter_mut().zip(entries).for_each(|(sum, entry)| *sum += entry * entry);
+        let Some(order) = column.checked_sub(slopes).filter(|waves| waves.is_multiple_of(2)).map(|waves| waves / 2)
+        else {
+            continue;
+        };
+        let worst = unit_variance[slopes..=column].iter().fold(0.0_f64, |worst, variance| worst.max(*variance));
         // Evenly spread points give each cosine and sine the variance 2/n.
-        (worst * points as f64 / 2.0 <= WORST_NOISE_GAIN * WORST_NOISE_GAIN).then_some((order, found))
-    };
-    if let Some(all) = solve(highest) {
-        return Some(all);
-    }
-    let mut best = solve(LOWEST_ORDER)?;
-    let (mut low, mut high) = (LOWEST_ORDER, highest);
-    while high - low > 1 {
-        let middle = usize::midpoint(low, high);
-        match solve(middle) {
-            Some(found) => (low, best) = (middle, found),
-            None => high = middle,
+        if worst * points as f64 / 2.0 > WORST_NOISE_GAIN * WORST_NOISE_GAIN {
+            break;
+        }
+        if order >= LOWEST_ORDER {
+            best = Some((order, unit_variance[..=column].to_vec()));
         }
     }
-    Some(best)
+    best
 }
 
 /// Why orders above `order` are not observable.
@@ -216,7 +214,7 @@ impl Cleaned {
     ) -> Result<Self, String> {
         let max_order = max_order.min((scan.len() / POINTS_AN_ORDER).max(LOWEST_ORDER));
         for round in 1.. {
-            let fit = Harmonics::fit(&scan.keep(&kept), max_order, about_mm)?;
+            let (fit, _) = Harmonics::fit(&scan.keep(&kept), max_order, about_mm)?;
             let distance_um: Vec<f64> =
                 scan.iter().map(|(angle, z, deviation)| deviation - fit.value_um(angle, z)).collect();
             let fence = Fence::around(&distance_um, deviations);
@@ -304,7 +302,7 @@ mod tests {
 
     #[test]
     fn harmonics_on_uneven_overlapping_angles() {
-        let found = Harmonics::fit(&measured(|_| 0.0), 20, None).unwrap();
+        let found = Harmonics::fit(&measured(|_| 0.0), 20, None).unwrap().0;
         let expected = |order: usize| match order {
             0 => Complex64::from(0.4),
             1 => Complex64::from_polar(0.3, -1.0),
@@ -328,11 +326,11 @@ mod tests {
             seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
             (seed >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
         };
-        let truth = Harmonics::fit(&measured(|_| 0.0), 20, None).unwrap();
+        let truth = Harmonics::fit(&measured(|_| 0.0), 20, None).unwrap().0;
         let (mut square, mut stated) = (0.0, 0.0);
         for _ in 0..40 {
             let noise: Vec<f64> = (0..700).map(|_| uniform()).collect();
-            let found = Harmonics::fit(&measured(|index| noise[index]), 20, None).unwrap();
+            let found = Harmonics::fit(&measured(|index| noise[index]), 20, None).unwrap().0;
             for order in 4..19 {
                 square += (found.coefficients[order] - truth.coefficients[order]).norm_sqr();
                 stated += found.variance[order];
@@ -372,7 +370,7 @@ mod tests {
         let scan = measured(|_| 0.0);
         let fit = |from: f64, to: f64, max_order: usize| {
             let kept: Vec<bool> = scan.angle_rad.iter().map(|angle| (from..to).contains(angle)).collect();
-            Harmonics::fit(&scan.keep(&kept), max_order, None)
+            Harmonics::fit(&scan.keep(&kept), max_order, None).map(|(found, _)| found)
         };
         // A tenth of the circle without points carries fewer orders than 20, and the reason has its place.
         let most = fit(0.7, 6.2, 20).unwrap();
@@ -383,14 +381,14 @@ mod tests {
         let gain = |order: usize| {
             let columns = 2 * order + 1;
             let rows: Vec<f64> = scan.angle_rad.iter().copied().filter(|angle| (0.7..6.2).contains(angle)).collect();
-            let matrix = DMatrix::from_fn(rows.len(), columns, |row, column| basis(rows[row], column));
+            let matrix = nalgebra::DMatrix::from_fn(rows.len(), columns, |row, column| basis(rows[row], column));
             let inverse = (matrix.transpose() * &matrix).try_inverse().unwrap();
             (inverse.diagonal().max() * rows.len() as f64 / 2.0).sqrt()
         };
         assert!(gain(most.max_order()) <= 10.0 && gain(most.max_order() + 1) > 10.0);
         assert!(fit(0.7, 6.2, 3).unwrap().limit.is_none(), "three lobes are carried");
         let few: Vec<bool> = (0..700).map(|index| index % 24 == 0).collect();
-        let few = Harmonics::fit(&scan.keep(&few), 20, None).unwrap();
+        let few = Harmonics::fit(&scan.keep(&few), 20, None).unwrap().0;
         assert_eq!((few.max_order(), few.limit.unwrap().contains("it has 30 points")), (14, true));
         let message = fit(1.0, 2.0, 20).unwrap_err();
         assert!(message.contains("between 114.") && message.contains("and 417."), "{message}");

@@ -1,14 +1,18 @@
 //! The tests of measured circles on their own points.
 
-use std::f64::consts::TAU;
+use std::{f64::consts::TAU, ops::Range};
 
 use runout_core::{
-    consistency::{Check, Kind, Structure, Test, rows},
-    numerics::{least_squares::Basis, number::significant, statistics::f_tail},
+    Complex64,
+    consistency::{Check, Kind, Structure, Test, check::FINDING, rows},
+    numerics::{
+        least_squares::{Basis, dot},
+        number::significant,
+        statistics::f_tail,
+    },
 };
 
 use crate::{
-    circle::Harmonics,
     robust::{ROUNDING_UM, rms},
     scan::{Scan, unwrapped},
 };
@@ -20,6 +24,11 @@ const FEWEST: usize = 40;
 const ONCE: [f64; 2] = [0.97, 1.03];
 /// So many times its largest step elsewhere a circle has where it does not close: an edge is no drift.
 const UNLIKE: f64 = 1.5;
+/// Noise that no instrument is below, in µm.
+const LEAST_NOISE_UM: f64 = 1e-4;
+/// Ratio of the power in two ranges of orders from which a low-pass took noise away (a scanned surface falls by 7), and the fewest orders of each.
+const FLAT: f64 = 30.0;
+const FEWEST_ORDERS: f64 = 8.0;
 
 /// What is declared of circles of these names: errors may depend on each other along the angle; circles are independent, have the same noise
 /// and may be offset.
@@ -42,18 +51,57 @@ pub(crate) fn structure(scans: &[Scan], names: &[String]) -> Structure {
         .divided("circles", Kind::Alike, circle, names.to_vec())
 }
 
-impl Harmonics {
-    /// Names points of a circle that are not like the others about them: `scan` about the axis, at its angles as measured.
-    pub(crate) fn unlike(&self, scan: &Scan, measured: &Scan, name: &str) -> Option<Check> {
-        let basis = Basis::of(self.columns(scan));
-        let mut left = scan.deviation_um.clone();
-        basis.remove_from(&mut left);
-        if rms(left.iter().copied()) < ROUNDING_UM {
-            return None;
-        }
-        let declared = structure(std::slice::from_ref(measured), &[name.to_owned()]);
-        Some(rows::unlike(&left, basis.columns())?.check(&declared, "µm"))
+/// Names points of a circle that are not like the others about them: `scan` about the axis, with the basis of its harmonics, and at its angles as
+/// measured.
+pub(crate) fn unlike(scan: &Scan, basis: &Basis, measured: &Scan, name: &str) -> Option<Check> {
+    let mut left = scan.deviation_um.clone();
+    basis.remove_from(&mut left);
+    if rms(left.iter().copied()) < ROUNDING_UM {
+        return None;
     }
+    let declared = structure(std::slice::from_ref(measured), &[name.to_owned()]);
+    Some(rows::unlike(&left, basis.columns())?.check(&declared, "µm"))
+}
+
+/// Why what is left beyond the harmonics of a circle does not show the noise within them: behind a low-pass, noise has less power at higher orders.
+pub(crate) fn hidden_noise(scan: &Scan, basis: &Basis) -> Option<String> {
+    let mut left = scan.deviation_um.clone();
+    basis.remove_from(&mut left);
+    let std_um = (dot(&left, &left) / left.len().saturating_sub(basis.rank()).max(1) as f64).sqrt();
+    let hidden = |what: String| {
+        Some(format!(
+            "{what}: a low-pass of the instrument, or smoothing, took noise away that lower orders still have. No ± is stated; load the profile as \
+             measured"
+        ))
+    };
+    if std_um < LEAST_NOISE_UM {
+        return hidden(format!(
+            "its harmonics leave {} µm rms, less than the noise of any instrument",
+            significant(std_um, 2)
+        ));
+    }
+    // The upper half of what is beyond the harmonics, in two parts.
+    let [from, to] = [usize::midpoint(basis.rank() / 2, scan.len() / 2), scan.len() / 2];
+    let middle = usize::midpoint(from, to);
+    let power = |orders: Range<usize>| {
+        let count = orders.len() as f64;
+        let of_order = |order: usize| {
+            let turned =
+                left.iter().zip(&scan.angle_rad).map(|(left, angle)| left * Complex64::cis(order as f64 * angle));
+            turned.sum::<Complex64>().norm_sqr()
+        };
+        (orders.map(of_order).sum::<f64>() / count, count)
+    };
+    let ([lower, count], [upper, _]) = (power(from..middle).into(), power(middle..to).into());
+    let ratio = (lower / upper).max(upper / lower);
+    let is_flat = count < FEWEST_ORDERS || ratio < FLAT || 2.0 * f_tail(ratio, 2.0 * count, 2.0 * count) > FINDING;
+    if is_flat {
+        return None;
+    }
+    hidden(format!(
+        "what is left at orders {from} to {middle} has {} times the size of that at {middle} to {to}, where noise has the same",
+        significant((lower / upper).sqrt(), 2)
+    ))
 }
 
 /// Whether a circle of one turn ends where it began: lines through the points before and behind its beginning have to meet there as those at all

@@ -1,7 +1,7 @@
 //! Local defects of a circle: arcs of neighbouring points far from all others, as an edge, a chip or dirt leaves them. No effect of the
 //! cylinder explains them, and one of them bends all others: the closed loop sets them aside, and says where.
 
-use runout_core::closed_loop::diagnosis::Unexplained;
+use runout_core::{closed_loop::diagnosis::Unexplained, numerics::number::signed};
 
 use crate::{circle::Cleaned, robust::rms, scan::Scan};
 
@@ -42,8 +42,9 @@ pub(crate) fn set_aside(scan: &Scan, name: &str) -> (Scan, Vec<Unexplained>) {
             orders: [0, 0],
             rms_um: rms(off.iter().copied()),
             place: format!(
-                "{name}: a local defect from {from:.1}° to {to:.1}° ({} points, up to {farthest:+.1} µm), left out of the fit",
-                points.len()
+                "{name}: a local defect from {from:.1}° to {to:.1}° ({} points, up to {} µm), left out of the fit",
+                points.len(),
+                signed(farthest, 3)
             ),
         }
     });

@@ -24,8 +24,14 @@ pub(crate) use circles::Circle;
 use circles::unseen;
 
 use crate::{
-    circle::Harmonics, config::LeastSquaresCylinderConfig, consistency::closes, generatrix::open_profiles,
-    predict::Prediction, robust::rms, scan::Scan, shape::Cylinder,
+    circle::Harmonics,
+    config::LeastSquaresCylinderConfig,
+    consistency::{closes, hidden_noise, unlike},
+    generatrix::open_profiles,
+    predict::Prediction,
+    robust::rms,
+    scan::Scan,
+    shape::Cylinder,
 };
 
 impl StageConfig for LeastSquaresCylinderConfig {
@@ -200,17 +206,17 @@ impl LeastSquaresCylinder {
         let mut level_variance = [0.0; 2];
         let mut height_mm = 0.0;
         if let Some(window) = &circle.window {
-            let along =
+            let (along, _) =
                 Harmonics::fit(&cylinder.place(window), self.0.max_order, Some(placed.mean_z_mm())).map_err(unfit)?;
             placed = placed.less(|angle, z| along.sloped_um(angle, z));
             let [low, high] = placed.z_range_mm();
             (level_variance, height_mm) = (along.level_variance, high - low);
         }
-        let fit = Harmonics::fit(&placed, self.0.max_order, None).map_err(unfit)?;
+        let (fit, basis) = Harmonics::fit(&placed, self.0.max_order, None).map_err(unfit)?;
         let order = fit.max_order();
         let named = circle.name();
         let closes = if circle.window.is_none() { closes(&placed, &named) } else { None };
-        let checks = fit.unlike(&placed, &circle.scan, "the point").into_iter().chain(closes).collect();
+        let checks = unlike(&placed, &basis, &circle.scan, "the point").into_iter().chain(closes).collect();
         circle.warnings.extend(fit.limit.iter().map(|limit| format!("{named}: {limit}")));
         for [from, to] in unseen(&placed, order).map(|ends| ends.map(f64::to_degrees)) {
             let gap = format!("no point is used between {from:.2}° and {to:.2}°: it is left out of every value");
@@ -222,6 +228,10 @@ impl LeastSquaresCylinder {
         for (order, variance) in variance.iter_mut().enumerate().skip(1) {
             let share = (height_mm / (PI * order as f64)).powi(2);
             *variance += level_variance[0] * share + level_variance[1] * share * share;
+        }
+        if let Some(reason) = hidden_noise(&placed, &basis) {
+            variance.fill(f64::NAN);
+            circle.warnings.push(format!("{named}: {reason}"));
         }
         let mut observable = vec![true; estimate.len()];
         estimate.resize(orders, Complex64::new(f64::NAN, f64::NAN));

@@ -1,8 +1,8 @@
 //! The least-squares cylinder, and where points are relative to its axis.
 
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::Vector3;
 
-use runout_core::numerics::least_squares;
+use runout_core::numerics::least_squares::Basis;
 
 use crate::scan::Scan;
 
@@ -71,8 +71,7 @@ impl Cylinder {
         let frame = self.frame();
         let placed: Vec<(f64, f64, f64)> =
             points.iter().flat_map(Scan::iter).map(|(angle, z, deviation)| frame.place(angle, z, deviation)).collect();
-        let matrix = DMatrix::from_fn(placed.len(), columns, |row, column| {
-            let (angle, z, _) = placed[row];
+        let entry = |column: usize, (angle, z, _): &(f64, f64, f64)| {
             let arm = z - self.z_mm;
             match column {
                 0 => 1.0,
@@ -81,11 +80,15 @@ impl Cylinder {
                 3 => arm * angle.cos(),
                 _ => arm * angle.sin(),
             }
-        });
-        let right = DVector::from_iterator(placed.len(), placed.iter().map(|(_, _, form)| *form));
-        let found = least_squares::solve(matrix, right)?;
+        };
+        let column = |column: usize| placed.iter().map(|place| entry(column, place)).collect();
+        let basis = Basis::of((0..columns).map(column).collect());
+        if basis.dependent() {
+            return None;
+        }
+        let found = basis.coefficients(&placed.iter().map(|(_, _, form)| *form).collect::<Vec<f64>>());
         let mut step = [0.0; 5];
-        step.iter_mut().zip(&found.values).for_each(|(step, value)| *step = *value);
+        step.iter_mut().zip(&found).for_each(|(step, value)| *step = *value);
         self.radius_offset_um += step[0];
         let [across, other, along] = &frame.axes;
         let direction = along + (across * step[3] + other * step[4]) / UM_PER_MM;

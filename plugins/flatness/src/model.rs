@@ -210,12 +210,19 @@ impl LinearModel for Flatness {
         let error = |truth: Truth, draw: &mut Draw| {
             let share = if truth == Truth::Least { least } else { 1.0 };
             let std = if freedom > 0 { std_urad * draw.true_std_ratio(freedom) } else { std_urad };
-            let truth_um: Vec<f64> = heights_um.iter().map(|height| share * height).collect();
-            let mut again_um = truth_um.clone();
-            for of in &influence {
-                let noise = std * draw.normal();
-                again_um.iter_mut().zip(of).for_each(|(height, of)| *height += noise * of);
+            let mut with_noise = |heights_um: &[f64]| {
+                let mut noisy_um = heights_um.to_vec();
+                for of in &influence {
+                    let noise = std * draw.normal();
+                    noisy_um.iter_mut().zip(of).for_each(|(height, of)| *height += noise * of);
+                }
+                noisy_um
+            };
+            let mut truth_um: Vec<f64> = heights_um.iter().map(|height| share * height).collect();
+            if truth == Truth::Hidden {
+                truth_um = with_noise(&truth_um);
             }
+            let again_um = with_noise(&truth_um);
             let [again, truth] = [again_um, truth_um].map(|heights| flatness(&steps.nodes_mm, &plane, &heights));
             again.iter().zip(truth).map(|(again, truth)| again - truth).collect()
         };

@@ -172,21 +172,15 @@ impl Model for CutModel {
         }
     }
 
-    fn start(&self, effect: usize, applied: &[Setting]) -> Option<Vec<f64>> {
+    fn start(&self, effect: usize, fit: &CutFit, applied: &[Setting]) -> Option<Vec<f64>> {
         let missing = MISSING.get(effect)?;
         match missing {
-            Missing::FeedScale => {
-                let fit = self.fit(applied).ok()?;
-                fit.left().feed_scale(&fit.cut).map(|scale| vec![1e6 * scale])
-            }
+            Missing::FeedScale => fit.left().feed_scale(&fit.cut).map(|scale| vec![1e6 * scale]),
             Missing::MapRotation | Missing::CutterRadius => {
-                let fit = self.fit(applied).ok()?;
                 let searched = self.data.searched(*missing)?;
                 fit.left().shifted(&fit.cut, &searched).map(|change| vec![change])
             }
-            Missing::SpindleLine(_) | Missing::TiltLine => {
-                self.best_start(effect, applied, self.fit(applied).ok()?.starts(*missing))
-            }
+            Missing::SpindleLine(_) | Missing::TiltLine => self.best_start(effect, applied, fit.starts(*missing)),
             _ => None,
         }
     }

@@ -1,8 +1,10 @@
 //! Means and standard deviations of approaches, the values of ISO 230-2 of them, and what is to be said of the runs.
 
+use std::borrow::Cow;
+
 use runout_core::{
     consistency::{Action, Check, Test},
-    draws::Draw,
+    draws::{Draw, Truth},
     numerics::{number::significant, statistics::chi2_tail},
     summary::Value,
 };
@@ -133,6 +135,15 @@ impl Cells {
             });
         }
         levelled
+    }
+
+    /// What the machine may be: this is what was found.
+    pub(crate) fn may_be<'a>(&'a self, truth: Truth, least: &'a Self, noise: &Noise, draw: &mut Draw) -> Cow<'a, Self> {
+        match truth {
+            Truth::Least => Cow::Borrowed(least),
+            Truth::Most => Cow::Borrowed(self),
+            Truth::Hidden => Cow::Owned(Self { mean: self.measured_again(noise, draw).1.mean, std: self.std.clone() }),
+        }
     }
 
     /// The machine that was found, and what as many runs on it would give.

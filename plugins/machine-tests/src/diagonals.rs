@@ -277,7 +277,7 @@ impl Diagonals {
         // µm/m of mm is nm.
         let scale = 1e-3 * self.0.scale_std_ppm * draw.normal();
         let mut drawn = |one: &Diagonal| {
-            let cells = if truth == Truth::Least { &one.least } else { &one.cells };
+            let cells = one.cells.may_be(truth, &one.least, &one.noise, draw);
             cells.errors(&one.approaches, &one.noise, scale, draw)
         };
         let errors: Vec<Vec<f64>> = all.iter().map(&mut drawn).collect();

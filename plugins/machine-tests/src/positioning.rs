@@ -154,7 +154,7 @@ impl PointSeparator for Positioning {
         let noise = approaches.noise();
         let least = cells.levelled(&noise, approaches.targets.len());
         let error = |truth: Truth, draw: &mut Draw| {
-            let cells = if truth == Truth::Least { &least } else { &cells };
+            let cells = cells.may_be(truth, &least, &noise, draw);
             let scale = scale * draw.normal();
             cells.errors(&approaches, &noise, scale, draw)
         };

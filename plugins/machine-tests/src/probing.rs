@@ -230,6 +230,7 @@ impl Probing {
             said.remarks.push("the sets are identical: copies show no uncertainty".into());
             return plain;
         }
+        said.checks.extend(touches.copies(1e-9 * value.max(1e-3)));
         let sizes = touches.sets.iter().zip(&ranges).map(|(set, range)| (format!("set {}", set.number), *range));
         said.checks.extend(unlike_units(&sizes.collect::<Vec<(String, f64)>>(), "convert their file"));
         let names: Vec<String> = (1..=count).map(|set| format!("touch of set {set}:")).collect();
@@ -249,9 +250,13 @@ impl Probing {
             range(&set)
         };
         let error = |truth: Truth, draw: &mut Draw| {
-            let means = if truth == Truth::Least { &least } else { &means };
             let std = std * draw.true_std_ratio(freedom);
-            let mut mean_of = |sets: usize| (0..sets).map(|_| one_set(means, std, draw)).sum::<f64>() / sets as f64;
+            let means: Vec<f64> = match truth {
+                Truth::Least => least.clone(),
+                Truth::Most => means.clone(),
+                Truth::Hidden => means.iter().map(|one| one + std / (count as f64).sqrt() * draw.normal()).collect(),
+            };
+            let mut mean_of = |sets: usize| (0..sets).map(|_| one_set(&means, std, draw)).sum::<f64>() / sets as f64;
             let truth = mean_of(SETS);
             vec![mean_of(count) - truth]
         };

@@ -359,7 +359,7 @@ impl PointSeparator for RotaryPath {
                 })
                 .collect();
             let error = |truth: Truth, draw: &mut Draw| {
-                let cells = if truth == Truth::Least { &least } else { cells };
+                let cells = cells.may_be(truth, &least, &noise, draw);
                 let errors = cells.errors(approaches, &noise, 0.0, draw);
                 used.iter().map(|(at, _)| errors[*at]).collect()
             };

@@ -8,6 +8,7 @@ use runout_core::{
         groups::{Group, Level, alike},
         judge,
         left_out::{LeftOut, left_out},
+        rows,
     },
     numerics::least_squares::Basis,
 };
@@ -118,6 +119,7 @@ fn of_repeated(campaign: &Campaign, residual: &[[f64; 3]], axis: usize) -> Vec<C
     let mut members = vec![Vec::new(); campaign.places_mm.len()];
     campaign.place_of.iter().enumerate().for_each(|(row, place)| members[*place].push(row));
     members.retain(|rows| rows.len() > 1);
+    let single = single(&members, residual, axis);
     // Errors that depend on each other are compared with their covariance: of fewer places.
     let correlated = campaign.correlated[axis].is_some();
     let compared = if correlated { COMPARED / 2 } else { COMPARED };
@@ -141,12 +143,22 @@ fn of_repeated(campaign: &Campaign, residual: &[[f64; 3]], axis: usize) -> Vec<C
     } else {
         structure
     };
-    let checks = judge(fit, &structure).checks.into_iter();
-    // Which of two readings of a place is the bad one is not known.
-    checks
-        .filter(|check| !matches!(check.test, Test::Rows | Test::Order))
-        .map(|check| check.among(campaign.measured.len()).within(COMPONENTS[axis]))
-        .collect()
+    // Deviations from a mean have no single reading.
+    let of_means =
+        judge(fit, &structure).checks.into_iter().filter(|check| !matches!(check.test, Test::Rows | Test::Order));
+    let single = single.filter(|_| !correlated);
+    of_means.chain(single).map(|check| check.among(campaign.measured.len()).within(COMPONENTS[axis])).collect()
+}
+
+/// Readings that are unlike the others of their place; of two, either may be the bad one.
+fn single(members: &[Vec<usize>], residual: &[[f64; 3]], axis: usize) -> Option<Check> {
+    let readings: Vec<Vec<f64>> =
+        members.iter().map(|rows| rows.iter().map(|row| residual[*row][axis]).collect()).collect();
+    let names = members.iter().flat_map(|rows| match rows[..] {
+        [one, other] => vec![format!("row {} or row {}", one + 1, other + 1); 2],
+        _ => rows.iter().map(|row| format!("row {}", row + 1)).collect(),
+    });
+    Some(rows::unlike_repeats(&readings)?.check(&Structure::default().naming(names.collect()), "µm"))
 }
 
 fn structure(campaign: &Campaign, members: &[&Vec<usize>], rows: &[usize]) -> Structure {

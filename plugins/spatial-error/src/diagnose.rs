@@ -8,7 +8,7 @@ use runout_core::{
         Effect, Settings,
         diagnosis::{Added, BiasPerUnit, Blind, Diagnosis, Level, Refused, Step, Unexplained, Verdict},
     },
-    consistency::Check,
+    consistency::{Check, linear},
     points::Points,
     stage::{PointDiagnosis, PointModel},
     summary::moved,
@@ -115,6 +115,9 @@ impl PointModel for SpatialError {
         }
         unexplained.extend(outcome.checks.iter().filter(|check| check.bars_verdict()).map(Unexplained::from));
         let levels = [&before, &after].map(|solution| level(&campaign, solution));
+        if unexplained.is_empty() {
+            unexplained.extend(above_noise(&campaign, &levels[1]));
+        }
         let trend_std = after.trend_std(&campaign);
         let steps = self.steps(&campaign, &added, &candidates, &levels)?;
         let mut diagnosis = Diagnosis {
@@ -247,6 +250,16 @@ impl SpatialError {
         }
         Ok(steps)
     }
+}
+
+/// What is left of the readings beyond their noise.
+fn above_noise(campaign: &Campaign, level: &Level) -> Option<Unexplained> {
+    let noise_dof = match campaign.noise {
+        Noise::Repeats { dof, .. } => (dof * campaign.measured.len()) as f64,
+        _ => f64::INFINITY,
+    };
+    let check = linear::residual(level.chi2_per_dof?, level.degrees_of_freedom as f64, noise_dof);
+    check.bars_verdict().then(|| unexplained(level.residual_rms_um, check.finding))
 }
 
 /// Neighbouring places that err together.

@@ -76,14 +76,15 @@ fn far_readings(campaign: &Campaign, left_out: &[[LeftOut; 3]]) -> Option<String
     };
     let far: Vec<usize> = (0..left_out.len()).filter(|place| size(&left_out[*place]) > FAR).collect();
     let worst = far.iter().copied().max_by(|a, b| size(&left_out[*a]).total_cmp(&size(&left_out[*b])))?;
-    let row = campaign.place_of.iter().position(|place| *place == worst).unwrap_or(0);
+    let rows = campaign.place_of.iter().zip(1..).filter(|(place, _)| **place == worst);
+    let rows: Vec<String> = rows.map(|(_, row): (_, usize)| row.to_string()).collect();
     let [x, y, z] = campaign.places_mm[worst];
     Some(format!(
         "{} places are more than {FAR} standard deviations from what the others predict, the worst by {:.0} at ({x}, {y}, {z}) mm, row \
          {}: a bad reading, or an error that is not smooth",
         far.len(),
         size(&left_out[worst]),
-        row + 1
+        rows.join(" or ")
     ))
 }
 

@@ -283,6 +283,20 @@ impl<'a> Tracing<'a> {
             });
             let left = |other: usize| Sums::of(self, state, [self.columns(other, false), self.columns(index, false)]);
             members.extend(alike.map(|trial| trial.1).filter(|other| left(*other).left(0, 1) < LEFT));
+            // The simplest member stands for the set: polynomials of unlike orders are alike at few places, and far apart between them.
+            let order = |member: usize| match self.candidates[member].shape {
+                Shape::None => Some(0),
+                Shape::Order(order) => Some(order),
+                Shape::Period { .. } | Shape::From(_) => None,
+            };
+            let simplest = (0..members.len()).filter_map(|place| Some((order(members[place])?, place))).min();
+            if let Some((_, place)) = simplest.filter(|_| order(index).is_some()) {
+                members.swap(0, place);
+                let chosen = trials.iter().find(|trial| !trial.0 && trial.1 == members[0]);
+                if let Some((_, _, of_chosen, fitted)) = chosen {
+                    (gain, estimate) = (*of_chosen, fitted.clone());
+                }
+            }
         }
         let mut found = state.found.clone();
         found.push(TracedEffect { members, jump, undecided, gain });

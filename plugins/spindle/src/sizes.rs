@@ -18,7 +18,7 @@ pub(crate) fn mistaken_units(rig: &Rig, readings: &Readings) -> Vec<Check> {
     let sensors = [false, true].map(|along| {
         let alike = (0..sizes.len()).filter(|sensor| looks_along(rig, *sensor) == along);
         let named = alike.map(|sensor| (format!("sensor `{}`", rig.sensors[sensor].id), sizes[sensor]));
-        unlike_units(&named.collect::<Vec<_>>(), "give those sensors their `unit` (`\"mm\"`, `\"nm\"`)")
+        unlike_units(&named.collect::<Vec<_>>(), "write `unit = \"mm\"` or `unit = \"nm\"` at these sensors")
     });
     sensors.into_iter().chain([unlike_units(&setups(rig, readings), "convert their file")]).flatten().collect()
 }

@@ -112,7 +112,7 @@ impl Model for TracesModel {
 
     /// A shift begins where the traces agree best among shifts a knot apart: features are narrow, so that the error has many
     /// minima. A drift begins with a usual time constant.
-    fn start(&self, effect: usize, applied: &[Setting]) -> Option<Vec<f64>> {
+    fn start(&self, effect: usize, _fit: &TracesFit, applied: &[Setting]) -> Option<Vec<f64>> {
         let candidate = self.0.candidates.get(effect)?;
         match candidate.kind {
             Kind::ThermalDrift => Some(vec![0.0, USUAL_TIME_CONSTANT]),

@@ -62,8 +62,9 @@ pub fn orthonormal(columns: Vec<Vec<f64>>, basis: &[Vec<f64>], tolerance: f64) -
     let mut made: Vec<Vec<f64>> = Vec::with_capacity(columns.len());
     for mut column in columns {
         let whole = norm(&column);
-        let mut shares = vec![0.0; basis.len() + made.len()];
-        let left = without_span(&mut column, &basis.iter().chain(&made), &mut shares);
+        let one = std::slice::from_mut(&mut column);
+        take_out(&basis.iter().chain(&made), one, &mut [vec![0.0; basis.len() + made.len()]]);
+        let left = norm(&column);
         if left > tolerance * whole {
             divide(&mut column, left);
             made.push(column);
@@ -72,38 +73,42 @@ pub fn orthonormal(columns: Vec<Vec<f64>>, basis: &[Vec<f64>], tolerance: f64) -
     made
 }
 
-/// Takes the span of orthonormal columns out of a column, adds what each was to `shares`, and gives the norm of the rest.
-/// Twice is enough (Giraud, Langou, Rozložník, Comput. Math. Appl. 50 (2005) 1069).
-fn without_span<'a>(
-    column: &mut [f64],
+/// Takes the span of orthonormal columns out of some columns, and adds what each was to their `shares`. Twice is enough (Giraud, Langou,
+/// Rozložník, Comput. Math. Appl. 50 (2005) 1069).
+fn take_out<'a>(
     span: &(impl Iterator<Item = &'a Vec<f64>> + Clone),
-    shares: &mut [f64],
-) -> f64 {
-    vectorised(WithoutSpan { column, span, shares })
+    columns: &mut [Vec<f64>],
+    shares: &mut [Vec<f64>],
+) {
+    vectorised(TakeOut { span, columns, shares });
 }
 
-struct WithoutSpan<'a, I> {
-    column: &'a mut [f64],
+struct TakeOut<'a, I> {
     span: &'a I,
-    shares: &'a mut [f64],
+    columns: &'a mut [Vec<f64>],
+    shares: &'a mut [Vec<f64>],
 }
 
-impl<'a, I: Iterator<Item = &'a Vec<f64>> + Clone> NullaryFnOnce for WithoutSpan<'_, I> {
-    type Output = f64;
+impl<'a, I: Iterator<Item = &'a Vec<f64>> + Clone> NullaryFnOnce for TakeOut<'_, I> {
+    type Output = ();
 
     #[inline(always)]
-    fn call(self) -> f64 {
-        let Self { column, span, shares } = self;
+    fn call(self) {
+        let Self { span, columns, shares } = self;
         for _ in 0..2 {
-            for (share, other) in shares.iter_mut().zip(span.clone()) {
-                let part = summed(other, column);
-                *share += part;
-                column.iter_mut().zip(other).for_each(|(entry, other)| *entry -= part * other);
+            for (place, other) in span.clone().enumerate() {
+                for (column, shares) in columns.iter_mut().zip(shares.iter_mut()) {
+                    let part = summed(other, column);
+                    shares[place] += part;
+                    column.iter_mut().zip(other).for_each(|(entry, other)| *entry -= part * other);
+                }
             }
         }
-        summed(column, column).sqrt()
     }
 }
+
+/// Columns that are made orthogonal to those before them at once: each of these comes from memory once for all of them.
+const PANEL: usize = 8;
 
 fn divide(column: &mut [f64], by: f64) {
     for entry in column {
@@ -140,21 +145,44 @@ impl Basis {
 
     /// With more columns.
     #[must_use]
-    pub fn extended(&self, columns: Vec<Vec<f64>>) -> Self {
+    pub fn extended(&self, mut columns: Vec<Vec<f64>>) -> Self {
         let mut made = self.clone();
-        for mut column in columns {
-            let whole = norm(&column);
-            let mut shares = vec![0.0; made.orthonormal.len()];
-            let left = without_span(&mut column, &made.orthonormal.iter(), &mut shares);
-            if left > INDEPENDENT * whole {
-                divide(&mut column, left);
-                made.independent.push(made.shares.len());
-                made.orthonormal.push(column);
-                shares.push(left);
+        for panel in columns.chunks_mut(PANEL) {
+            let before = made.rank();
+            let whole: Vec<f64> = panel.iter().map(|column| norm(column)).collect();
+            let mut shares = vec![vec![0.0; before]; panel.len()];
+            take_out(&made.orthonormal.iter(), panel, &mut shares);
+            for ((column, mut shares), whole) in panel.iter_mut().zip(shares).zip(whole) {
+                let mut column = std::mem::take(column);
+                let mut own = [vec![0.0; made.rank() - before]];
+                take_out(&made.orthonormal[before..].iter(), std::slice::from_mut(&mut column), &mut own);
+                shares.extend(own.into_iter().flatten());
+                let left = norm(&column);
+                if left > INDEPENDENT * whole {
+                    divide(&mut column, left);
+                    made.independent.push(made.shares.len());
+                    made.orthonormal.push(column);
+                    shares.push(left);
+                }
+                made.shares.push(shares);
             }
-            made.shares.push(shares);
         }
         made
+    }
+
+    /// Of the first columns only.
+    #[must_use]
+    pub fn first(mut self, columns: usize) -> Self {
+        self.shares.truncate(columns);
+        self.independent.retain(|column| *column < columns);
+        self.orthonormal.truncate(self.independent.len());
+        self
+    }
+
+    /// Columns before the first one that depends on those before it.
+    #[must_use]
+    pub fn leading(&self) -> usize {
+        self.independent.iter().enumerate().take_while(|(place, column)| place == *column).count()
     }
 
     /// What each dependent column (its place in A) leaves open: coefficients x with A·x = 0 and 1 for that column.
@@ -247,18 +275,23 @@ impl Basis {
         (0..count).map(|row| (0..count).map(|column| entry(row, column)).collect()).collect()
     }
 
-    /// The columns of R⁻¹.
-    fn inverse(&self) -> Vec<Vec<f64>> {
+    /// The columns of R⁻¹, one an independent column: of the leading columns alone it has the first of them.
+    #[must_use]
+    pub fn inverse(&self) -> Vec<Vec<f64>> {
         let unit = |unit: usize| (0..self.rank()).map(|row| if row == unit { 1.0 } else { 0.0 }).collect();
         (0..self.rank()).map(|row| self.solve_upper(unit(row))).collect()
     }
 
-    fn solve_upper(&self, right: Vec<f64>) -> Vec<f64> {
+    fn solve_upper(&self, mut right: Vec<f64>) -> Vec<f64> {
         let mut solution = vec![0.0; self.shares.len()];
-        for (row, (right, column)) in right.into_iter().zip(&self.independent).enumerate().rev() {
-            let later = self.independent[row + 1..].iter();
-            let known: f64 = later.map(|other| self.shares[*other][row] * solution[*other]).sum();
-            solution[*column] = (right - known) / self.shares[*column][row];
+        for (row, column) in self.independent.iter().enumerate().rev() {
+            if right[row] == 0.0 {
+                continue;
+            }
+            let shares = &self.shares[*column];
+            let found = right[row] / shares[row];
+            solution[*column] = found;
+            right[..row].iter_mut().zip(shares).for_each(|(right, share)| *right -= share * found);
         }
         solution
     }

@@ -139,7 +139,7 @@ fn diagnose_turns(
     let looked_at = pipeline.evaluate.first_ront();
     // Before is what a run gives, which leaves known effects and names of stations alone.
     if settings.known.is_empty() {
-        let separated = threads::spread(&stations, |station| separate(separator, station, line.rig));
+        let separated = threads::spread(&stations, 2, |station| separate(separator, station, line.rig));
         found.before = separated.into_iter().collect::<Result<_>>()?;
     }
     let solved = found.before.into_iter().zip(found.after).zip(as_named);

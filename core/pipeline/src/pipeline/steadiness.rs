@@ -1,6 +1,7 @@
 //! Whether the turns of a run are steady: levels that creep or step, and noise that is estimated too high.
 
 use crate::summary::StationSummary;
+use runout_numerics::number::signed;
 use runout_turning::{
     creep::{Creep, Levels, creeps},
     level_step::{LevelStep, level_step},
@@ -58,7 +59,8 @@ impl Steadiness {
                 let Some(LevelStep { turn, by_um, .. }) = step else { continue };
                 let (id, setup) =
                     (&rig.sensors[sensor].id, rig.setups.get(profile.setup).map_or("", |setup| &setup.id));
-                let text = format!("{id} steps by {by_um:+.2} µm at turn {turn} of the capture {setup}/{station}");
+                let text =
+                    format!("{id} steps by {} µm at turn {turn} of the capture {setup}/{station}", signed(by_um, 3));
                 self.steps.push((by_um.abs(), text));
             }
             // A straight line through a step is no creep.
@@ -95,7 +97,7 @@ impl Steadiness {
         let enough = (SHARE * self.stations as f64).max(1.0);
         let creeping = rig.sensors.iter().zip(&self.sensors).filter(|(_, seen)| seen.stations as f64 >= enough);
         let each: Vec<String> = creeping
-            .map(|(sensor, seen)| format!("{} by {:+.2} µm over {}", sensor.id, seen.largest_um, seen.place))
+            .map(|(sensor, seen)| format!("{} by {} µm over {}", sensor.id, signed(seen.largest_um, 3), seen.place))
             .collect();
         (!each.is_empty()).then(|| {
             format!(
@@ -202,7 +204,7 @@ mod tests {
         steadiness.take("s1", &profiles, &rig);
         let warnings: Vec<String> = steadiness.warnings(&rig).collect();
         let [warning] = &warnings[..] else { panic!("{warnings:?}") };
-        assert!(warning.contains("S2 steps by +20.0") && warning.contains("of the capture turned/s1"), "{warning}");
+        assert!(warning.contains("S2 steps by +20.") && warning.contains("of the capture turned/s1"), "{warning}");
         assert!(warning.contains("at turn 29") || warning.contains("at turn 30"), "{warning}");
     }
 }

@@ -44,12 +44,12 @@ pub fn unlike_units(parts: &[(String, f64)], remedy: &str) -> Option<Check> {
     let (low, high) = sorted.split_at(cut);
     let (odd, others, how) = if low.len() < high.len() { (low, high, "smaller") } else { (high, low, "larger") };
     let names = |parts: &[&(String, f64)]| parts.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>().join(", ");
+    let beside = if others.len() > odd.len() { "the others".to_owned() } else { names(others) };
     let finding = || {
         format!(
-            "the readings of {} are {:.0} times {how} than those of {}: some have another unit (millimetres, µm, nanometres): {remedy}",
+            "the readings of {} are {:.0} times {how} than those of {beside}: some have another unit (millimetres, µm, nanometres): {remedy}",
             names(odd),
-            nearest(cut),
-            names(others)
+            nearest(cut)
         )
     };
     Some(Check::new(Test::Measured, format!("unit of {}", names(odd)), nearest(cut), &[], 0.0).finding(finding))
@@ -289,7 +289,7 @@ mod tests {
             let parts: Vec<_> = sizes.iter().zip(1..).map(|(size, set)| (format!("set {set}"), *size)).collect();
             unlike_units(&parts, "convert their file").map(|check| check.finding).unwrap_or_default()
         };
-        assert!(of(&[1.1, 950.0, 0.8]).contains("set 2 are 864 times larger than those of set 3, set 1: some"));
+        assert!(of(&[1.1, 950.0, 0.8]).contains("set 2 are 864 times larger than those of the others: some"));
         assert!(of(&[1.1, 1e-3, 0.8]).contains("set 2 are 800 times smaller") && of(&[1.1, 25.0, 0.8]).is_empty());
         assert!(of(&[1.1, 950.0, 800.0, 0.8]).contains("set 3, set 2 are 727 times larger than those of set 4, set 1"));
         assert!(of(&[1.1]).is_empty() && of(&[1.1, 0.0]).is_empty() && of(&[1.1, f64::NAN]).is_empty());

@@ -1,7 +1,10 @@
 //! Sets of touches of a sphere or a ring: the centre of each by least squares, and the radial deviations from it.
 
 use runout_core::{
-    Error, ErrorKind, Result, consistency::groups::Group, numerics::least_squares::Basis, points::Points,
+    Error, ErrorKind, Result,
+    consistency::{Check, Test, groups::Group},
+    numerics::least_squares::Basis,
+    points::Points,
 };
 
 /// Steps of a fit, and the share of the radius below which one is its last.
@@ -102,6 +105,22 @@ pub(crate) fn range(values: &[f64]) -> f64 {
 }
 
 impl Touches {
+    /// Sets that are equal to the first one that they are equal to: what two fits of copies differ by is rounding.
+    pub(super) fn copies(&self, rounding_um: f64) -> Option<Check> {
+        let same = |one: &Set, other: &Set| {
+            one.deviations_um.iter().zip(&other.deviations_um).all(|(a, b)| (a - b).abs() < rounding_um)
+        };
+        let copy = |(at, set): (usize, &Set)| {
+            let of = self.sets[..at].iter().find(|before| same(before, set))?;
+            Some(format!("set {} is equal to set {}", set.number, of.number))
+        };
+        let found: Vec<String> = self.sets.iter().enumerate().filter_map(copy).collect();
+        (!found.is_empty()).then(|| {
+            let finding = || format!("{}, touch by touch: a copy shows no noise; leave it out", found.join(", "));
+            Check::new(Test::Measured, "copies of sets", found.len() as f64, &[], 0.0).finding(finding)
+        })
+    }
+
     /// Length of the mean of the directions of the first set: 0 all around, 0.64 of half a ring, 0.5 of half a sphere, 1 at one place.
     pub(super) fn lopsidedness(&self) -> f64 {
         let directions = &self.sets[0].directions;

@@ -7,7 +7,10 @@ use runout_core::{
     Complex64,
     closed_loop::diagnosis::Unexplained,
     level_step::{LevelStep, level_step},
-    numerics::least_squares::{cholesky, invert_lower},
+    numerics::{
+        least_squares::{cholesky, invert_lower},
+        number::signed,
+    },
     profile::{Profile, Turns, smooth},
     stage::Station,
 };
@@ -108,7 +111,7 @@ pub(crate) fn level_steps(selection: &Selection, station: &Station, known: &[Cha
             let share = numbers.iter().filter(|number| **number > turn).count() as f64 / numbers.len() as f64;
             found.push(Unexplained {
                 rms_um: by_um.abs() * (share * (1.0 - share)).sqrt(),
-                place: format!("the level steps by {by_um:+.2} µm at turn {turn}"),
+                place: format!("the level steps by {} µm at turn {turn}", signed(by_um, 3)),
                 ..reading(selection, setup, sensor)
             });
         }

@@ -18,7 +18,9 @@ use runout_core::{
 };
 
 use super::{
+    FEWEST_SPREAD,
     data::{self, Shared, StationData},
+    drift::Part,
     projection::project_some,
     remainder::remainder,
     solved::Solved,
@@ -49,12 +51,17 @@ impl SpindleFit {
             return Err(Error::new("apply", "effects", "their values are beyond all bounds").of(ErrorKind::Numerical));
         }
         let layout = shared.layout.altered(&alterations);
-        let stations = threads::spread(&shared.data, |data| Solved::new(&shared, data, &layout, &alterations));
+        let mut stations =
+            threads::spread(&shared.data, FEWEST_SPREAD, |data| Solved::new(&shared, data, &layout, &alterations));
         // The declared model's fit is what it is; values at which no solution settles are not those of an effect.
         if !applied.is_empty() && stations.iter().any(|solved| solved.estimate.is_unsettled()) {
             return Err(Error::new("apply", "effects", "no solution settles at their values").of(ErrorKind::Numerical));
         }
         let remainder = remainder(&shared, &stations, &layout, &alterations);
+        // A loop holds several fits of all stations.
+        for (solved, _) in stations.iter_mut().zip(&shared.data).filter(|(_, data)| data.part != Part::All) {
+            solved.propagation = None;
+        }
         shared.check_effects()?;
         Ok(Self { shared, alterations, layout, stations, remainder, others: Vec::new(), weights: vec![1.0] })
     }
@@ -183,7 +190,7 @@ impl SpindleFit {
     fn own_separations(&self, stations: &[Station]) -> Vec<Separation> {
         let solver = self.shared.solver(&self.layout, &self.alterations);
         let each: Vec<(&Solved, &Station)> = self.stations.iter().zip(stations).collect();
-        threads::spread(&each, |(solved, station)| {
+        threads::spread(&each, FEWEST_SPREAD, |(solved, station)| {
             let propagation = solved.stated.as_ref().or(solved.propagation.as_ref());
             let by_reading = by_reading(&solved.operators, &solved.corrected, &solved.linear);
             let residual = Residual { by_reading, ..solved.residual.clone() };
@@ -220,7 +227,7 @@ impl Fit for SpindleFit {
             });
             columns.collect::<Vec<Vec<f64>>>()
         };
-        for columns in threads::spread(&stations, of_station) {
+        for columns in threads::spread(&stations, FEWEST_SPREAD, of_station) {
             signature.iter_mut().zip(columns).for_each(|(column, of_station)| column.extend(of_station));
         }
         signature

@@ -76,7 +76,7 @@ impl SpindleModel {
         });
         let seen: Vec<(&Station, Arc<TurnObservations>)> = seen.collect();
         let each = |data: fn(&Selection, &Layout, &Station, &Arc<TurnObservations>) -> Result<StationData>| {
-            let all = threads::spread(&seen, |(station, seen)| data(&selection, &layout, station, seen));
+            let all = threads::spread(&seen, FEWEST_SPREAD, |(station, seen)| data(&selection, &layout, station, seen));
             all.into_iter().collect::<Result<Vec<_>>>()
         };
         let (all, split) = (each(StationData::whole)?, each(StationData::split)?);
@@ -119,6 +119,8 @@ impl SpindleModel {
     }
 }
 
+/// Stations from which on a fit spreads them over all processors.
+const FEWEST_SPREAD: usize = 8;
 /// Fits that a loop holds at a time, and one more: that of a trial beside the best so far, and what a final one is mixed with.
 const FITS: usize = 4;
 
@@ -210,7 +212,7 @@ impl Model for SpindleModel {
         self.traced.kind(effect).size(values)
     }
 
-    fn start(&self, effect: usize, applied: &[Setting]) -> Option<Vec<f64>> {
+    fn start(&self, effect: usize, _fit: &SpindleFit, applied: &[Setting]) -> Option<Vec<f64>> {
         let (kind, place) = (self.traced.kind(effect), &self.traced.places[effect]);
         let values = kind.far_values();
         let data = self.traced.data.first().filter(|_| !values.is_empty())?;
@@ -265,6 +267,10 @@ impl Model for SpindleModel {
 
     fn whole(&self) -> &Self {
         self.whole.as_deref().unwrap_or(self)
+    }
+
+    fn is_spread(&self) -> bool {
+        self.traced.data.len() >= FEWEST_SPREAD
     }
 }
 

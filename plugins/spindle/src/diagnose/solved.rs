@@ -21,7 +21,7 @@ pub(super) struct Solved {
     pub operators: Operators,
     /// Effects as they act on the turns fitted.
     pub alterations: Alterations,
-    /// Nothing of a part of the turns.
+    /// Nothing of a part of the turns, once what is held out has been predicted.
     pub propagation: Option<Propagation>,
     /// The same with what results are uncertain by beyond noise: angles, turns that change, and what the residual refutes. Nothing where
     /// that is nothing, and of a part of the turns.
@@ -98,7 +98,6 @@ impl Solved {
             stated.iter_mut().for_each(|stated| stated.times(&factors));
         }
         // A loop holds several fits of all stations: what is not asked for again goes.
-        let propagation = propagation.filter(|_| data.part == Part::All);
         operators.weights = None;
         (corrected.covariance, corrected.scatter) = (None, None);
         let alterations = altered;

@@ -76,7 +76,7 @@ pub fn put_right(
         return Ok(PutRight::default());
     }
     let left_of = |station: &Station| Ok(Left::of(&separator.separate(station)?));
-    let mut left = threads::spread(stations, left_of).into_iter().collect::<Result<Vec<Left>>>()?;
+    let mut left = threads::spread(stations, 2, left_of).into_iter().collect::<Result<Vec<Left>>>()?;
     let mut found = PutRight { declared: vec![None; stations.len()], ..PutRight::default() };
     let mut declared = left.clone();
     for (station, as_marked) in marks::as_marked(stations, &recounted) {

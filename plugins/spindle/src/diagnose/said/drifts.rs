@@ -2,6 +2,7 @@
 
 use runout_core::{
     closed_loop::diagnosis::{Added, Diagnosis, Estimated},
+    numerics::number::signed,
     rig::{Sensor, Setup},
 };
 
@@ -81,8 +82,10 @@ fn one_displacement(drifts: &[f64], shared: &Shared) -> Option<String> {
     let all: f64 = across().map(|(_, drift)| drift * drift).sum();
     (left < ONE_DISPLACEMENT * ONE_DISPLACEMENT * all).then(|| {
         format!(
-            "the drifts of the sensors fit one displacement of the part beside all of them, x {x:+.3} µm and y {y:+.3} µm over each \
-             capture: the part, the spindle or the holder of all sensors moves"
+            "the drifts of the sensors fit one displacement of the part beside all of them, x {} µm and y {} µm over each \
+             capture: the part, the spindle or the holder of all sensors moves",
+            signed(x, 3),
+            signed(y, 3)
         )
     })
 }

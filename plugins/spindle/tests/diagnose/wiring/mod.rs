@@ -390,7 +390,7 @@ fn a_setup_in_another_unit_is_named() {
     let ((rig, mut mixed), (_, in_mm)) = (of("[]"), of(all));
     mixed.profiles[1] = in_mm.profiles[1].clone();
     let warnings = warned(&rig, &mixed);
-    assert!(warnings.iter().any(|warning| warning.contains("has another unit")), "{warnings:?}");
+    assert!(warnings.iter().any(|warning| warning.contains("have another unit")), "{warnings:?}");
     let sound = warned(&rig, &of("[]").1);
     assert!(!sound.iter().any(|warning| warning.contains("another unit")), "{sound:?}");
 }
