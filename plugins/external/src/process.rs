@@ -55,6 +55,8 @@ impl Process {
         command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
         #[cfg(unix)]
         std::os::unix::process::CommandExt::process_group(&mut command, 0);
+        // An interrupt that comes meanwhile waits until the program is listed.
+        let mut listed = running();
         let mut child = command.spawn().map_err(|error| {
             let missing = error.kind() == ErrorKindOfSystem::NotFound;
             Failure {
@@ -66,7 +68,8 @@ impl Process {
                 said: String::new(),
             }
         })?;
-        running().push(child.id());
+        listed.push(child.id());
+        drop(listed);
         limit(&child, program);
         let (requests, to_write) = channel();
         let (to_take, answers) = sync_channel(1);

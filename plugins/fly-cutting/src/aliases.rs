@@ -85,7 +85,7 @@ fn of_line(model: &CutModel, closed: &mut Closed<CutFit>, known: usize, place: u
 }
 
 /// Ratios with amplitude, phase, and by how much χ² they promise to be worse than the line itself; and the ratio of the latter.
-fn promising(fit: &CutFit, line: Line, highest: usize) -> (Vec<(f64, f64, f64, f64)>, f64) {
+pub(crate) fn promising(fit: &CutFit, line: Line, highest: usize) -> (Vec<(f64, f64, f64, f64)>, f64) {
     let heights = fit.heights();
     let mut residual_nm = fit.phased.residual_nm.clone();
     let mut weight = 0.0;

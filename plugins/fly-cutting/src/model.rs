@@ -17,6 +17,7 @@ use runout_core::{
 };
 
 use crate::{
+    aliases::promising,
     cells::Cells,
     config::FlyCuttingConfig,
     effects::{MISSING, Missing, applied, tidy},
@@ -102,17 +103,26 @@ impl CutModel {
 }
 
 impl CutModel {
-    /// Of lines that look alike on a sample of the points, the one with which least is left of all.
+    /// Of lines that look alike at one y, the one with which least is left of all points.
     fn best_start(&self, effect: usize, applied: &[Setting], starts: &[[f64; 3]]) -> Option<Vec<f64>> {
-        let [start, _, ..] = starts else { return starts.first().map(|only| only.to_vec()) };
+        let start = starts.first()?;
         let refitted = |values: &[f64]| {
             let mut settings = applied.to_vec();
             settings.push(Setting { effect, values: values.to_vec() });
             let refit = refit(self, settings, applied.len()).ok()?;
-            Some((refit.chi2, refit.settings.last()?.values.clone()))
+            Some((refit.chi2, refit.settings.last()?.values.clone(), refit.fit))
         };
-        let (chi2, values) = refitted(start)?;
+        let Some((chi2, values, fit)) = refitted(start) else { return Some(start.to_vec()) };
         let [ratio, amplitude, phase_deg] = values[..] else { return Some(values) };
+        if starts.len() == 1 {
+            let tilts = MISSING[effect].line() == Some(true);
+            let line = Line { ratio, amplitude, phase: phase_deg.to_radians(), tilts };
+            let (promised, own) = promising(&fit, line, self.data.config.max_frequency_ratio);
+            let best = promised.first().filter(|best| (best.0 - own).abs() > 1e-3);
+            let other =
+                best.and_then(|(ratio, amplitude, phase, _)| refitted(&[*ratio, *amplitude, phase.to_degrees()]));
+            return Some(other.filter(|(other, ..)| *other < chi2).map_or(values, |(_, other, _)| other));
+        }
         // At the middle of the rows, where an alias has the same height, only the slope of its phase along y differs.
         let angles = self.data.fitted.rows.iter().map(|row| row.angle.to_degrees());
         let middle_deg = angles.sum::<f64>() / self.data.fitted.rows.len().max(1) as f64;
@@ -134,8 +144,8 @@ impl CutModel {
         };
         let others = shifted.chain(mirrored).filter(|other| (other[0] - ratio).abs() > 1e-3 && other[0] > 0.0);
         let best = others.filter_map(left_with).min_by(|one, other| one.0.total_cmp(&other.0));
-        let other = best.and_then(|(_, other)| refitted(&other)).filter(|(other, _)| *other < chi2);
-        Some(other.map_or(values, |(_, other)| other))
+        let other = best.and_then(|(_, other)| refitted(&other)).filter(|(other, ..)| *other < chi2);
+        Some(other.map_or(values, |(_, other, _)| other))
     }
 }
 

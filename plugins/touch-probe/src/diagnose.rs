@@ -1,5 +1,7 @@
 //! The touch probe as a model for the closed loop.
 
+use std::collections::BTreeSet;
+
 use runout_core::{
     Error, Result,
     closed_loop::{
@@ -32,6 +34,8 @@ const INDEPENDENT: f64 = 1e-7;
 /// Amplitude of an order against what the second order makes of it, below which it is not believed: the latter is known to its
 /// size only.
 const SECOND_ORDER: f64 = 3.0;
+/// Directions that are nearer are one.
+const SAME_DEG: f64 = 0.5;
 /// Sectors of the ring in which what is left is summed.
 const SECTORS: usize = 36;
 
@@ -45,7 +49,9 @@ impl PointModel for TouchProbe {
         let missing = self.missing();
         let terms = self.terms(points, &prepared, &missing)?;
         let terms = terms.with_known(&settings.known).considering(settings.effects.as_deref());
-        let settings = &Settings { max_added: settings.max_added.min(MOST_ADDED), ..settings.clone() };
+        let mut settings = Settings { max_added: settings.max_added.min(MOST_ADDED), ..settings.clone() };
+        settings.left_out.extend(self.beyond_directions(&prepared, &missing));
+        let settings = &settings;
         let mut closed = closed_loop::diagnose(&terms, settings)?;
         let orders: Vec<usize> = orders(&missing).collect();
         let added = |closed: &Closed<LinearFit>| {
@@ -83,6 +89,23 @@ fn orders(missing: &[Missing]) -> impl Iterator<Item = usize> + '_ {
 }
 
 impl TouchProbe {
+    /// Orders of more waves than half of the directions of the touches: each would be another name of a lower one.
+    fn beyond_directions(&self, prepared: &Prepared, missing: &[Missing]) -> Vec<usize> {
+        let directions = [0, 1].map(|frame| {
+            let turns = |touch| (angles(&self.0, touch)[frame] / (SAME_DEG.to_radians())).round();
+            let whole = (360.0 / SAME_DEG).round();
+            let all: BTreeSet<i64> =
+                prepared.touches.all.iter().map(|touch| turns(touch).rem_euclid(whole) as i64).collect();
+            all.len()
+        });
+        let is_beyond = |one: &Missing| match one {
+            Missing::LobingOrder(order) => 2 * order >= directions[0],
+            Missing::RingFormOrder(order) => 2 * order >= directions[1],
+            _ => false,
+        };
+        (0..missing.len()).filter(|effect| is_beyond(&missing[*effect])).collect()
+    }
+
     /// Orders that were added, and that are no larger than what the second order makes of them.
     fn of_second_order(&self, prepared: &Prepared, missing: &[Missing], closed: &Closed<LinearFit>) -> Vec<usize> {
         let fit = self.fit(prepared, &[], &Content::declared(), &prepared.readings_um());
