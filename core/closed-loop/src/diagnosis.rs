@@ -47,6 +47,8 @@ pub struct Diagnosis {
     pub outputs: Vec<PathBuf>,
 }
 
+/// Other members of a set that a sentence names.
+const MOST_MEMBERS: usize = 3;
 const NO_UNCERTAINTY: &str =
     "the parameters of the effects have no ±: something unexplained is left, and what it does to them is not known";
 
@@ -60,7 +62,7 @@ impl Diagnosis {
     #[must_use]
     pub fn headline(&self, with_findings: bool) -> String {
         let undecided = self.added.iter().filter(|one| !one.confounded_with.is_empty());
-        let sets: Vec<String> = undecided.map(Added::members).collect();
+        let sets: Vec<String> = undecided.map(Added::some_members).collect();
         let refuted = refuted_by(&self.consistency).filter(|_| with_findings);
         let refuted = refuted.map(|said| format!(": {said}")).unwrap_or_default();
         let verdict = format!("{}{refuted}", self.in_words());
@@ -211,6 +213,16 @@ impl Added {
         let targets = self.targets.iter().map(String::as_str);
         let first = std::iter::once(self.effect.as_str()).chain(targets).collect::<Vec<_>>().join(" ");
         std::iter::once(&first).chain(&self.confounded_with).cloned().collect::<Vec<_>>().join(" or ")
+    }
+
+    /// The same in a sentence: of many, the first ones.
+    fn some_members(&self) -> String {
+        let others = self.confounded_with.len();
+        if others <= MOST_MEMBERS {
+            return self.members();
+        }
+        let some = Self { confounded_with: self.confounded_with[..MOST_MEMBERS].to_vec(), ..self.clone() };
+        format!("{} or {} others", some.members(), others - MOST_MEMBERS)
     }
 }
 

@@ -91,11 +91,6 @@ impl PendingFile {
         self.create()?.write_all(contents).map_err(|error| self.caused(error))
     }
 
-    /// Has the contents last, whatever happens to the machine.
-    fn sync(&self) -> Result<()> {
-        durable::file(&self.temporary).map_err(|error| self.caused(error))
-    }
-
     /// Refuses to begin what may not fit: a library that the disk fails in the middle of a file may not survive it.
     ///
     /// # Errors
@@ -236,20 +231,18 @@ pub fn commit_all(files: Vec<PendingFile>) -> Result<Vec<PathBuf>> {
 /// # Errors
 /// When the file system refuses a rename; those before it are taken back.
 pub fn commit_last_after_others(files: Vec<PendingFile>) -> Result<Vec<PathBuf>> {
-    let sync = |files: &[PendingFile]| {
-        let folders = files.iter().map(|file| folder_of(&file.temporary));
-        let is_done = durable::all_in(folders).map_err(|error| {
-            let first = files.first().map(|file| file.destination.display().to_string());
-            Error::caused("write", first.unwrap_or_default(), error)
-        })?;
-        if is_done { Ok(()) } else { sync_each(files) }
+    let sync = |files: &[PendingFile]| match durable::all_in(files.iter().map(|file| folder_of(&file.temporary))) {
+        Ok(true) => Ok(()),
+        Ok(false) => sync_each(files),
+        Err(error) => Err(Error::caused("sync", "the file system of the results", error)),
     };
     commit(files, sync, publication::publish_last_after_others)
 }
 
 /// One after the other, each would wait for the disk by itself.
 fn sync_each(files: &[PendingFile]) -> Result<()> {
-    threads::each(files, PendingFile::sync).into_iter().collect()
+    let sync = |file: &PendingFile| durable::file(&file.temporary).map_err(|error| file.caused(error));
+    threads::each(files, sync).into_iter().collect()
 }
 
 fn commit(

@@ -9,7 +9,6 @@ use crate::{
     effects::{MISSING, SPINDLE_LINE},
     model::{CutFit, CutModel},
     passes::Line,
-    search::Left,
 };
 
 /// Ratios whose refits differ by less than this in χ² cannot be separated.
@@ -47,7 +46,7 @@ fn of_line(model: &CutModel, closed: &mut Closed<CutFit>, known: usize, place: u
     let remainder = closed.after.remainder();
     let level = remainder.chi2_per_dof();
     let unit = if remainder.noise_is_known() { level.max(1.0) } else { level };
-    let (promised, own) = promising(&closed.after, line, highest);
+    let (promised, own) = closed.after.promising(line, highest);
     let (mut refits, mut found, mut alike) = ([0, 0], Vec::new(), Vec::new());
     for (other, amplitude, phase, worse) in promised {
         if (other - own).abs() < 1e-3 {
@@ -82,32 +81,6 @@ fn of_line(model: &CutModel, closed: &mut Closed<CutFit>, known: usize, place: u
     aliases.ratios.extend(refitted.filter_map(|trial| trial.settings[place].values.first()));
     aliases.ratios.extend(alike);
     aliases
-}
-
-/// Ratios with amplitude, phase, and by how much χ² they promise to be worse than the line itself; and the ratio of the latter.
-pub(crate) fn promising(fit: &CutFit, line: Line, highest: usize) -> (Vec<(f64, f64, f64, f64)>, f64) {
-    let heights = fit.heights();
-    let mut residual_nm = fit.phased.residual_nm.clone();
-    let mut weight = 0.0;
-    for row in &heights.rows {
-        let lever = line.lever(row);
-        weight += lever * lever * row.points.len() as f64;
-        for point in row.points.clone() {
-            let pass = f64::from(fit.phased.surface.pass[point]);
-            residual_nm[point] += line.amplitude * lever * line.at(pass, row).cos();
-        }
-    }
-    let left = Left { heights, surface: &fit.phased.surface, residual_nm: &residual_nm };
-    let all = left.aliases(line.ratio, line.tilts, highest, 1e-3);
-    let own = all.iter().min_by(|one, other| (one.0 - line.ratio).abs().total_cmp(&(other.0 - line.ratio).abs()));
-    let (own_ratio, own_size) =
-        own.map_or((line.ratio, line.amplitude.powi(2)), |(ratio, size)| (*ratio, size.norm_sqr()));
-    let noise_nm = heights.std_nm.unwrap_or(1e3);
-    let worse = |size: f64| 0.5 * weight * (own_size - size) / (noise_nm * noise_nm);
-    let mut promised: Vec<(f64, f64, f64, f64)> =
-        all.iter().map(|(ratio, size)| (*ratio, size.norm(), size.arg(), worse(size.norm_sqr()))).collect();
-    promised.sort_by(|one, other| one.3.total_cmp(&other.3));
-    (promised, own_ratio)
 }
 
 /// A ratio in words, as a member of a confounded set.

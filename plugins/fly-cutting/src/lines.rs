@@ -8,6 +8,7 @@ use crate::{
     model::CutFit,
     passes::{Cut, Line},
     phase,
+    search::Left,
 };
 
 /// Δχ² below which a line is not tried: less is no evidence for its three parameters in any map.
@@ -97,5 +98,31 @@ impl CutFit {
         let mut alike = sorted(others.chain([best]).collect());
         alike.truncate(ALIKE);
         alike
+    }
+
+    /// Ratios with amplitude, phase, and by how much χ² they promise to be worse than the line itself; and the ratio of the latter.
+    pub(crate) fn promising(&self, line: Line, highest: usize) -> (Vec<(f64, f64, f64, f64)>, f64) {
+        let heights = self.heights();
+        let mut residual_nm = self.phased.residual_nm.clone();
+        let mut weight = 0.0;
+        for row in &heights.rows {
+            let lever = line.lever(row);
+            weight += lever * lever * row.points.len() as f64;
+            for point in row.points.clone() {
+                let pass = f64::from(self.phased.surface.pass[point]);
+                residual_nm[point] += line.amplitude * lever * line.at(pass, row).cos();
+            }
+        }
+        let left = Left { heights, surface: &self.phased.surface, residual_nm: &residual_nm };
+        let all = left.aliases(line.ratio, line.tilts, highest, 1e-3);
+        let own = all.iter().min_by(|one, other| (one.0 - line.ratio).abs().total_cmp(&(other.0 - line.ratio).abs()));
+        let (own_ratio, own_size) =
+            own.map_or((line.ratio, line.amplitude.powi(2)), |(ratio, size)| (*ratio, size.norm_sqr()));
+        let noise_nm = heights.std_nm.unwrap_or(1e3);
+        let worse = |size: f64| 0.5 * weight * (own_size - size) / (noise_nm * noise_nm);
+        let mut promised: Vec<(f64, f64, f64, f64)> =
+            all.iter().map(|(ratio, size)| (*ratio, size.norm(), size.arg(), worse(size.norm_sqr()))).collect();
+        promised.sort_by(|one, other| one.3.total_cmp(&other.3));
+        (promised, own_ratio)
     }
 }

@@ -17,7 +17,6 @@ use runout_core::{
 };
 
 use crate::{
-    aliases::promising,
     cells::Cells,
     config::FlyCuttingConfig,
     effects::{MISSING, Missing, applied, tidy},
@@ -117,7 +116,7 @@ impl CutModel {
         if starts.len() == 1 {
             let tilts = MISSING[effect].line() == Some(true);
             let line = Line { ratio, amplitude, phase: phase_deg.to_radians(), tilts };
-            let (promised, own) = promising(&fit, line, self.data.config.max_frequency_ratio);
+            let (promised, own) = fit.promising(line, self.data.config.max_frequency_ratio);
             let best = promised.first().filter(|best| (best.0 - own).abs() > 1e-3);
             let other =
                 best.and_then(|(ratio, amplitude, phase, _)| refitted(&[*ratio, *amplitude, phase.to_degrees()]));

@@ -244,8 +244,6 @@ pub enum SimulatedEffect {
     },
 }
 
-/// Angle of a map about its normal, at most.
-const MOST_ROTATION_URAD: f64 = 1e5;
 /// Orders of table straightness.
 const ORDERS: std::ops::RangeInclusive<usize> = 2..=5;
 
@@ -361,11 +359,7 @@ impl SimulatedEffect {
                 let problem = format!("a change of {change_mm} mm leaves nothing of a radius of {nose_radius_mm} mm");
                 Err(Fault::at("change_mm", problem))
             }
-            Self::MapRotation { angle_urad, .. } if angle_urad.abs() <= MOST_ROTATION_URAD => Ok(()),
-            Self::MapRotation { angle_urad, .. } => {
-                let problem = format!("expected at most {MOST_ROTATION_URAD} µrad, found {angle_urad}");
-                Err(Fault::at("angle_urad", problem))
-            }
+            Self::MapRotation { angle_urad, .. } => finite("angle_urad", *angle_urad),
             Self::CutterRadius { change_mm, .. } => {
                 let cutter_radius_mm = cut.cutter_radius_mm + change_mm;
                 above_zero("change_mm", "mm", cutter_radius_mm).and(grid.checked(cutter_radius_mm))
