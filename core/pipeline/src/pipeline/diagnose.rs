@@ -60,6 +60,13 @@ pub struct Diagnosed {
 /// # Errors
 /// As [`diagnose`] has.
 pub fn diagnosed(pipeline: &Pipeline, threads: Option<NonZeroUsize>, observer: &dyn Observer) -> Result<Diagnosed> {
+    if threads == Some(NonZeroUsize::MIN) {
+        return threads::alone(|| loop_on(pipeline, threads, observer));
+    }
+    loop_on(pipeline, threads, observer)
+}
+
+fn loop_on(pipeline: &Pipeline, threads: Option<NonZeroUsize>, observer: &dyn Observer) -> Result<Diagnosed> {
     let source = pipeline.loader.open(&pipeline.request())?;
     let no_model = |separator: &str| {
         Error::new("diagnose", &pipeline.title, format!("`{separator}` has no model of effects for the closed loop"))
