@@ -54,7 +54,7 @@ pub struct Profile {
     /// Standard uncertainty of the spindle angle that the turns are counted from, in rad: of marks that are known to a part of a
     /// sample only. It turns all harmonics together.
     pub angle_std_rad: f64,
-    /// Standard deviation by which such marks turn single turns, in rad. It turns the eccentricity of every turn.
+    /// Standard deviation by which marks, or a speed that changes between them, turn single turns, in rad. It turns the eccentricity of every turn.
     pub turn_angle_std_rad: f64,
     /// Mean speed over the turns used, where the sampling rate is known.
     pub speed_rpm: Option<f64>,
@@ -188,7 +188,7 @@ impl Profile {
         self.mean.iter().skip(channels).take(channels).map(|value| value.norm()).fold(0.0, f64::max)
     }
 
-    /// What marks at whole samples add to single turns, in µm rms: they turn an eccentricity e by their scatter σ, which is eσ/√2 in every
+    /// What marks that turn single turns add to them, in µm rms: they turn an eccentricity e by their scatter σ, which is eσ/√2 in every
     /// direction.
     #[must_use]
     pub fn jitter_um(&self) -> f64 {

@@ -8,6 +8,7 @@
 //! readings are bridged before anything is interpolated between them ([`interruptions`]), and each turn once more
 //! ([`bridge`]).
 
+mod angle_scatter;
 mod angle_unit;
 mod bridge;
 mod encoder;
@@ -205,12 +206,12 @@ impl SynchronousAverage {
 /// Asynchronous motion below this, in µm rms, is not said.
 const SAID_UM: f64 = 0.01;
 
-/// Says what marks at whole samples add to asynchronous motion.
+/// Says what marks add to asynchronous motion that turn single turns.
 fn jitter_of_marks(profile: &Profile) -> Option<String> {
     (profile.jitter_um() >= SAID_UM).then(|| {
         format!(
-            "{}: marks at whole samples scatter single turns by {}° (std), which with an eccentricity of {} µm adds about {} µm rms to asynchronous \
-             motion; give marks between samples or the encoder's angle, or centre the part",
+            "{}: the marks turn single turns by {}° (std), which with an eccentricity of {} µm adds about {} µm rms to asynchronous motion; time the \
+             marks between samples, record the encoder's angle, or centre the part",
             profile.object,
             significant(profile.turn_angle_std_rad.to_degrees(), 2),
             significant(profile.eccentricity_um(), 3),
@@ -308,13 +309,19 @@ impl Averager for SynchronousAverage {
         count.rejected.sort_by_key(|turn| turn.turn);
         self.enough(&capture, &count, count.used)?;
 
+        let mut of_turns = None;
         if let Some(turn) = capture.median_turn_samples() {
             // What the recording cannot hold is not found to be 0: it is not there.
             let (mut orders, channels) = (orders_held(turn) + 1, capture.channels());
-            if let Some(passed) = outcome.passed.take() {
+            of_turns = outcome.angle_scatter.and_then(|scatter| scatter.said(orders, &capture.object));
+            let turned = outcome.angle_scatter.map(|scatter| scatter.passed(outcome.mean.len() / channels.max(1)));
+            let passed: Vec<Vec<Complex64>> = outcome.passed.iter().cloned().chain(turned).collect();
+            for passed in passed {
                 resample::undo(&mut outcome, &passed, channels);
                 orders = orders.min(passed::held(&passed));
-                outcome.passed = Some(passed);
+            }
+            if let (Some(scatter), Some(covariance)) = (outcome.angle_scatter, &mut outcome.covariance) {
+                scatter.add_to(covariance, &outcome.mean, channels);
             }
             outcome.mean.truncate(orders * channels);
             for matrices in
@@ -331,12 +338,14 @@ impl Averager for SynchronousAverage {
         let speed_rpm = capture.sample_rate_hz.map(|rate_hz| 60.0 * rate_hz / mean_turn);
         let mut warnings = self.warnings(&capture, speed_rpm, outcome.passed.as_deref());
         warnings.extend(of_angle);
+        warnings.extend(of_turns);
         warnings.extend(near_synchronous(&outcome.near_tones, count.used, &capture.object));
         warnings.extend(outcome.bridged.map(|bridged| format!("{}: {bridged}", capture.object)));
         if let Some(speed_rpm) = speed_rpm {
             in_orders(&mut capture.responses, speed_rpm, &capture.object, &mut warnings);
         }
         let marks_within = known_within(&capture);
+        let by_marks = || turn_angle_std_rad(&capture.marks, marks_within);
         let mut profile = Profile {
             object: capture.object,
             setup: capture.setup,
@@ -355,7 +364,7 @@ impl Averager for SynchronousAverage {
             spread: outcome.spread,
             turns: count,
             angle_std_rad: angle_std_rad(&capture.marks, marks_within),
-            turn_angle_std_rad: turn_angle_std_rad(&capture.marks, marks_within),
+            turn_angle_std_rad: outcome.angle_scatter.map_or_else(by_marks, |scatter| scatter.std_rad()),
             speed_rpm,
             sample_rate_hz: capture.sample_rate_hz,
             responses: capture.responses,

@@ -1,4 +1,4 @@
-//! What marks at whole samples add to asynchronous motion.
+//! What marks that turn single turns add to asynchronous motion.
 
 use crate::Value;
 use runout_turning::profile::Profile;

@@ -11,7 +11,12 @@ use runout_core::{
     },
 };
 
-use super::{scatter::Scatter, size::Size, slow::Slow};
+use super::{
+    angle_scatter::{AngleScatter, Deviations},
+    scatter::Scatter,
+    size::Size,
+    slow::Slow,
+};
 
 /// Turns from which on the neighbours hold a tenth of the scatter or less: it is known well enough without them.
 const MANY_TURNS: usize = 40;
@@ -97,6 +102,14 @@ impl Mean {
             *entry /= self.turns as f64;
         }
         Some(covariance)
+    }
+
+    /// By how much the turns looked at are turned against each other, about their [mean](Self::mean).
+    pub(super) fn angle_scatter(&self, mean: &[Complex64], by_marks: bool) -> Option<AngleScatter> {
+        let (squares, powers) = self.scatter.deviations()?;
+        let turns = [self.scatter.turns(), self.turns];
+        let deviations = Deviations { mean, squares: &squares, powers: &powers, channels: self.size.channels, turns };
+        AngleScatter::of(&deviations, by_marks)
     }
 
     /// The [scatter](Self::scatter) without the neighbours that [`covariance`](Self::covariance) is taken from; `None` below

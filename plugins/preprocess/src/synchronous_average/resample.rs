@@ -15,6 +15,7 @@ use runout_core::{
 
 use super::{
     SynchronousAverage,
+    angle_scatter::AngleScatter,
     bridge::Bridges,
     encoder,
     kernel::{Interpolation, Kernel, REACH, on_sample},
@@ -53,6 +54,8 @@ pub(super) struct CaptureAverage {
     pub bridged_beyond_rad: f64,
     /// What passes of each order where the interpolation weakens some that are kept.
     pub passed: Option<Vec<Complex64>>,
+    /// By how much turns are turned against each other, where that shows.
+    pub angle_scatter: Option<AngleScatter>,
 }
 
 /// The resampling of one capture under way. All buffers live as long as it.
@@ -167,9 +170,11 @@ impl<'a> Resampling<'a> {
         }
         self.means.sum_up();
         let neighbours = self.means.whole.neighbours();
+        let mean = self.means.whole.mean();
         CaptureAverage {
             turn_angles: self.angles,
-            mean: self.means.whole.mean(),
+            angle_scatter: self.means.whole.angle_scatter(&mean, !self.capture.encoder),
+            mean,
             covariance: self.means.whole.covariance(neighbours.as_ref()),
             near_tones: neighbours.as_ref().map(near_tones).unwrap_or_default(),
             scatter: self.means.whole.scatter(),

@@ -28,6 +28,8 @@ pub(super) struct Scatter {
     sum: Vec<f64>,
     /// Σ d dᴴ on and below the diagonal, `[row][column ≤ row][re, im][order]`.
     products: Vec<f64>,
+    /// Σ d².
+    squares: Vec<f64>,
 }
 
 impl Scatter {
@@ -43,6 +45,7 @@ impl Scatter {
             turn: vec![0.0; values],
             sum: vec![0.0; values],
             products: vec![0.0; 2 * triangle(channels) * plane],
+            squares: vec![0.0; values],
         }
     }
 
@@ -83,6 +86,21 @@ impl Scatter {
         Some(covariance)
     }
 
+    /// What turns are off their mean by: 1/(T−1) Σ (cₜ − mean)² and Σ |cₜ − mean|², `[order][channel]`; `None` below two turns.
+    pub(super) fn deviations(&self) -> Option<(Vec<Complex64>, Vec<f64>)> {
+        let turns = self.turns as f64;
+        let each = || (0..self.orders).flat_map(|order| (0..self.channels).map(move |channel| (order, channel)));
+        let sum = |order, channel| self.at(&self.sum, order, channel);
+        let square = |(order, channel)| {
+            (self.at(&self.squares, order, channel) - sum(order, channel).powi(2) / turns) / (turns - 1.0)
+        };
+        let power = |(order, channel)| {
+            let products = self.at(&self.products, order, triangle(channel) + channel).re;
+            (products - sum(order, channel).norm_sqr() / turns) / (turns - 1.0)
+        };
+        (self.turns > 1).then(|| (each().map(square).collect(), each().map(power).collect()))
+    }
+
     /// A number of a pair of planes.
     fn at(&self, planes: &[f64], order: usize, pair: usize) -> Complex64 {
         let re = 2 * pair * self.plane + order;
@@ -100,11 +118,18 @@ struct Summing<'a> {
 impl FusedWork for Summing<'_> {
     #[inline(always)]
     fn call<A: Arithmetic>(self) {
-        let Scatter { channels, orders, plane, pivot, turn, sum, products, .. } = self.scatter;
+        let Scatter { channels, orders, plane, pivot, turn, sum, products, squares, .. } = self.scatter;
         part(self.turn, *orders, *plane, turn);
         for ((value, pivot), sum) in turn.iter_mut().zip(&*pivot).zip(&mut *sum) {
             *value -= pivot;
             *sum += *value;
+        }
+        for (turn, squares) in turn.chunks_exact(2 * *plane).zip(squares.chunks_exact_mut(2 * *plane)) {
+            let ((turn_re, turn_im), (re, im)) = (turn.split_at(*plane), squares.split_at_mut(*plane));
+            for (((a, b), re), im) in turn_re.iter().zip(turn_im).zip(re).zip(im) {
+                *re = A::mul_add(*a, *a, A::mul_add(-b, *b, *re));
+                *im = A::mul_add(2.0 * a, *b, *im);
+            }
         }
         let mut products = products.chunks_exact_mut(2 * *plane);
         for row in 0..*channels {
