@@ -27,21 +27,10 @@ impl Layout {
     fn observable_unknowns(&self, qr: &PivotedQr, order: usize) -> Vec<bool> {
         let mut observable = qr.observable(NULL_TOLERANCE);
         if order == 1 {
-            let unknowns = self.first_order_unknowns();
-            let first = self.factor_matrix(unknowns.len(), &self.first_order_matrix()).observable(NULL_TOLERANCE);
-            let is_observable =
-                |wanted| !unknowns.contains(&wanted) || unknowns.iter().zip(&first).any(|(u, t)| *u == wanted && *t);
-            for (quantity, observable) in self.unknowns.iter().zip(&mut observable) {
+            let determined = self.determined_at_first_order();
+            for ((quantity, observable), determined) in self.unknowns.iter().zip(&mut observable).zip(determined) {
                 // Of the face, 1/rev is how it was clamped, in each setup by itself: the equations of order 1 say all of z.
-                if *quantity == Quantity::Z {
-                    *observable = is_observable(FirstOrder::Axial);
-                    continue;
-                }
-                *observable &= match quantity {
-                    Quantity::Form(_) | Quantity::FaceForm(_) => true,
-                    motion if motion.is_tilt() => is_observable(FirstOrder::CounterRotatingTilt),
-                    _ => is_observable(FirstOrder::CounterRotatingShift),
-                };
+                *observable = determined && (*observable || *quantity == Quantity::Z);
             }
         } else if self.max_noise_gain.is_finite() {
             for (observable, noisy) in observable.iter_mut().zip(self.too_noisy(qr)) {
@@ -53,6 +42,22 @@ impl Layout {
             observable[shift] &= observable[tilt];
         }
         observable
+    }
+
+    /// Whether the equations of order 1 determine of each unknown what they have of it: of motion the part that turns against the spindle, also where
+    /// its other part is lost in the eccentricity.
+    pub(crate) fn determined_at_first_order(&self) -> Vec<bool> {
+        let unknowns = self.first_order_unknowns();
+        let first = self.factor_matrix(unknowns.len(), &self.first_order_matrix()).observable(NULL_TOLERANCE);
+        let is_determined =
+            |wanted| !unknowns.contains(&wanted) || unknowns.iter().zip(&first).any(|(u, t)| *u == wanted && *t);
+        let of = |quantity: &Quantity| match quantity {
+            Quantity::Form(_) | Quantity::FaceForm(_) => true,
+            Quantity::Z => is_determined(FirstOrder::Axial),
+            motion if motion.is_tilt() => is_determined(FirstOrder::CounterRotatingTilt),
+            _ => is_determined(FirstOrder::CounterRotatingShift),
+        };
+        self.unknowns.iter().map(of).collect()
     }
 
     /// Which unknowns carry more than [`max_noise_gain`](Self::max_noise_gain) times the readings' noise.

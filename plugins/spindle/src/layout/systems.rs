@@ -18,6 +18,8 @@ pub struct System {
     pub matrix: Vec<Complex64>,
     /// Whether each of the layout's unknowns is observable.
     pub observable: Vec<bool>,
+    /// Whether what the equations have of each is: at order 1, the motion that turns against the spindle.
+    pub determined: Vec<bool>,
 }
 
 /// Those that were asked for. A copy begins empty, as copies are made to be changed.
@@ -37,12 +39,13 @@ impl Systems {
         let work_out = |order: usize| {
             let matrix = layout.matrix_with(&motions, order);
             let observable = layout.observable_with(&matrix, order);
-            let (columns, matrix) = if order == 1 {
-                (layout.first_order_unknowns().len(), layout.first_order_matrix())
+            let (columns, matrix, determined) = if order == 1 {
+                let determined = layout.determined_at_first_order();
+                (layout.first_order_unknowns().len(), layout.first_order_matrix(), determined)
             } else {
-                (layout.unknowns.len(), matrix)
+                (layout.unknowns.len(), matrix, observable.clone())
             };
-            Arc::new(System { columns, matrix, observable })
+            Arc::new(System { columns, matrix, observable, determined })
         };
         let mut known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         while known.len() < max_order.min(KEPT) {

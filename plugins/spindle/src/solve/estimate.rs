@@ -13,6 +13,7 @@ pub(crate) struct Estimate {
     pub first: Vec<Complex64>,
     /// `[order][unknown]` from order 0; order 1 holds the motion that turns against the spindle.
     pub(super) values: Vec<Complex64>,
+    /// At order 1, whether that motion is, also where what turns with the spindle is lost in the eccentricity.
     pub(super) observable: Vec<bool>,
     /// What form may be at lost orders, likewise; empty where none is lost.
     pub(super) likely: Vec<Complex64>,

@@ -281,7 +281,8 @@ mod tests {
                 if deficient(order) {
                     matrix.chunks_exact_mut(columns).for_each(|row| row[2] = row[0] - 2.0 * row[1]);
                 }
-                Arc::new(System { columns, matrix, observable: vec![true; columns] })
+                let all = vec![true; columns];
+                Arc::new(System { columns, matrix, observable: all.clone(), determined: all })
             })
             .collect();
         let solve = |weights: Option<&Blocks>, system: &System| {

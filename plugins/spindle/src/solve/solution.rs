@@ -259,7 +259,7 @@ impl Solver<'_> {
         let mut first = Vec::new();
         for order in 1..=max_order {
             let solution = apply(&operators.orders[order - 1].operator, &readings[order * count..(order + 1) * count]);
-            observable[order * width..(order + 1) * width].copy_from_slice(operators.observable(order));
+            observable[order * width..(order + 1) * width].copy_from_slice(&operators.systems[order - 1].determined);
             if order == 1 {
                 let motion = self.first_order_motion(&solution);
                 values[width..2 * width].copy_from_slice(&motion);
