@@ -54,24 +54,65 @@ pub fn without_noise(variance: f64, of_noise: f64) -> f64 {
     if variance > 0.0 { (1.0 - of_noise / variance).max(0.0).sqrt() } else { 0.0 }
 }
 
-/// What is known of values. `error` measures a truth again, and gives what the values are then off by.
+/// A truth measured again.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct MeasuredAgain {
+    /// Its values.
+    pub truth: Vec<f64>,
+    /// What they are off by.
+    pub error: Vec<f64>,
+}
+
+/// What is known of values. `measure` measures a truth again.
 ///
 /// What an error is on average, noise has raised the value by: the interval takes it back (basic bootstrap: Davison, Hinkley, *Bootstrap
-/// Methods*, 1997, section 2.4). It contains those of all truths.
-pub fn measured_again(values: &[f64], seed: u64, error: impl Fn(Truth, &mut Draw) -> Vec<f64>) -> Vec<Uncertainty> {
+/// Methods*, 1997, section 2.4). It contains those of all truths, and what noise may have hidden itself: near 0, the size of what is hidden is not
+/// that of an error.
+pub fn measured_again(
+    values: &[f64],
+    seed: u64,
+    measure: impl Fn(Truth, &mut Draw) -> MeasuredAgain,
+) -> Vec<Uncertainty> {
     let mut draw = Draw::new(seed);
-    let errors = Truth::ALL.map(|truth| (0..DRAWS).map(|_| error(truth, &mut draw)).collect::<Vec<Vec<f64>>>());
+    let all = Truth::ALL.map(|truth| (0..DRAWS).map(|_| measure(truth, &mut draw)).collect::<Vec<MeasuredAgain>>());
     let known = |(index, value): (usize, &f64)| {
         let (mut std, mut interval) = (0.0_f64, [f64::INFINITY, f64::NEG_INFINITY]);
-        for errors in &errors {
-            let mut of: Vec<f64> = errors.iter().map(|error| error[index]).collect();
-            of.sort_by(f64::total_cmp);
-            let mean = of.iter().sum::<f64>() / DRAWS as f64;
-            std = std.max((of.iter().map(|one| (one - mean).powi(2)).sum::<f64>() / (DRAWS - 1) as f64).sqrt());
-            let at = |share: f64| value - of[(share * (DRAWS - 1) as f64).round() as usize];
-            interval = [interval[0].min(at(0.975)), interval[1].max(at(0.025))];
+        let mut widen = |ends: [f64; 2]| interval = [interval[0].min(ends[0]), interval[1].max(ends[1])];
+        for (truth, measured) in Truth::ALL.into_iter().zip(&all) {
+            let errors = Sorted::of(measured.iter().map(|one| one.error[index]));
+            std = std.max(errors.std());
+            let [low, high] = errors.interval_95();
+            widen([value - high, value - low]);
+            if truth == Truth::Hidden {
+                let hidden = Sorted::of(measured.iter().map(|one| one.truth[index]));
+                widen(hidden.interval_95().map(|end| end - errors.mean()));
+            }
         }
         Uncertainty::new(std, interval, Truth::ALL.len() * DRAWS)
     };
     values.iter().enumerate().map(known).collect()
+}
+
+/// Numbers of [`DRAWS`] draws, in order.
+struct Sorted(Vec<f64>);
+
+impl Sorted {
+    fn of(numbers: impl Iterator<Item = f64>) -> Self {
+        let mut numbers: Vec<f64> = numbers.collect();
+        numbers.sort_by(f64::total_cmp);
+        Self(numbers)
+    }
+
+    fn mean(&self) -> f64 {
+        self.0.iter().sum::<f64>() / self.0.len() as f64
+    }
+
+    fn std(&self) -> f64 {
+        let mean = self.mean();
+        (self.0.iter().map(|one| (one - mean).powi(2)).sum::<f64>() / (self.0.len() - 1) as f64).sqrt()
+    }
+
+    fn interval_95(&self) -> [f64; 2] {
+        [0.025, 0.975].map(|share| self.0[(share * (self.0.len() - 1) as f64).round() as usize])
+    }
 }

@@ -20,7 +20,7 @@ mod section;
 mod spectrum;
 mod uncertainty;
 
-pub use again::{Draw, Truth, measured_again, without_noise};
+pub use again::{Draw, MeasuredAgain, Truth, measured_again, without_noise};
 pub use angles::{angles_for_parabolas, crest_order, drawn_angles};
 pub use errors::{DrawnErrors, Errors};
 pub use interval::Interval;

@@ -11,7 +11,7 @@ use runout_core::{
         linear_terms::{Declared, LinearFit, LinearTerms, Observations, Term},
     },
     consistency::{Kind, Structure},
-    draws::{Draw, Truth, measured_again, seed, without_noise},
+    draws::{Draw, MeasuredAgain, Truth, measured_again, seed, without_noise},
     fault::Fault,
     numerics::least_squares::{Basis, dot},
     pipeline::{Context, StageConfig},
@@ -207,7 +207,7 @@ impl LinearModel for Flatness {
             .collect();
         let power = dot(&heights_um, &heights_um) / heights_um.len() as f64;
         let least = without_noise(power, variance.iter().sum::<f64>() / variance.len() as f64);
-        let error = |truth: Truth, draw: &mut Draw| {
+        let measure = |truth: Truth, draw: &mut Draw| {
             let share = if truth == Truth::Least { least } else { 1.0 };
             let std = if freedom > 0 { std_urad * draw.true_std_ratio(freedom) } else { std_urad };
             let mut with_noise = |heights_um: &[f64]| {
@@ -224,10 +224,11 @@ impl LinearModel for Flatness {
             }
             let again_um = with_noise(&truth_um);
             let [again, truth] = [again_um, truth_um].map(|heights| flatness(&steps.nodes_mm, &plane, &heights));
-            again.iter().zip(truth).map(|(again, truth)| again - truth).collect()
+            let error = again.iter().zip(truth).map(|(again, truth)| again - truth).collect();
+            MeasuredAgain { truth: truth.to_vec(), error }
         };
         let numbers = flatness(&steps.nodes_mm, &plane, &heights_um);
-        let known = measured_again(&numbers, seed(&["flatness"]), error);
+        let known = measured_again(&numbers, seed(&["flatness"]), measure);
         let each = SYMBOLS.iter().zip(numbers).zip(known);
         let values = each.map(|(((symbol, reference, about), number), mut known)| {
             known.interval_95 = known.interval_95.map(|end| end.max(0.0));

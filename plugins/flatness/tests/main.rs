@@ -157,6 +157,24 @@ fn intervals_hold_the_truth() {
     }
 }
 
+/// A plate that is fifty times as flat as the other: what is found is noise, which may have hidden as much.
+#[test]
+fn intervals_of_a_flat_plate_hold_the_truth() {
+    let mut held = [0; 5];
+    for seed in 0..150 {
+        let [mut flat, sound] = [3.0, 0.0].map(|noise_urad| Rows::of(&LINES, noise_urad, 0.0, seed));
+        flat.0.iter_mut().zip(&sound.0).for_each(|(row, sound)| row.2 -= 0.98 * sound.2);
+        let found = run(&flat, Some(3.0)).unwrap();
+        for ((held, value), truth) in held.iter_mut().zip(&found.values).zip(truth()) {
+            let [low, high] = value.interval_95().unwrap();
+            *held += u32::from((low..=high).contains(&(0.02 * truth)));
+        }
+    }
+    let shares = held.map(|held| f64::from(held) / 1.5);
+    println!("flat: {shares:.1?} %");
+    assert!(shares.iter().all(|share| *share >= 89.0), "{shares:?}");
+}
+
 #[test]
 fn a_drift_is_found_with_its_size_and_a_clean_plate_names_nothing() {
     for seed in 0..8 {

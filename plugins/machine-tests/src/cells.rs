@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use runout_core::{
     consistency::{Action, Check, Test},
-    draws::{Draw, Truth},
+    draws::{Draw, MeasuredAgain, Truth},
     numerics::{number::significant, statistics::chi2_tail},
     summary::Value,
 };
@@ -170,14 +170,17 @@ impl Cells {
         (truth, again)
     }
 
-    /// What the values are off by where the machine is measured again: `scale` is the drawn error of the instrument's scale.
-    pub(crate) fn errors(&self, approaches: &Approaches, noise: &Noise, scale: f64, draw: &mut Draw) -> Vec<f64> {
+    /// The values where the machine is measured again: `scale` is the drawn error of the instrument's scale.
+    pub(crate) fn again(&self, approaches: &Approaches, noise: &Noise, scale: f64, draw: &mut Draw) -> MeasuredAgain {
         let (truth, again) = self.measured_again(noise, draw);
-        let of = |cells: &Self| cells.values(&approaches.sides).into_iter().map(|(_, value, _)| value);
+        let of = |cells: &Self| -> Vec<f64> {
+            cells.values(&approaches.sides).into_iter().map(|(_, value, _)| value).collect()
+        };
         // Noise raises ranges, and the values are less by that. The scale is one unknown number: the machine is what was found, less it.
         let scaled = of(&self.clone().tilted(&approaches.targets, scale));
-        let errors = of(&again).zip(of(&truth)).zip(scaled.zip(of(self)));
-        errors.map(|((again, truth), (scaled, found))| (again - truth) - (scaled - found)).collect()
+        let by_scale: Vec<f64> = scaled.iter().zip(of(self)).map(|(scaled, found)| scaled - found).collect();
+        let truth: Vec<f64> = of(&truth).iter().zip(by_scale).map(|(truth, by_scale)| truth + by_scale).collect();
+        MeasuredAgain { error: of(&again).iter().zip(&truth).map(|(again, truth)| again - truth).collect(), truth }
     }
 
     /// The same of an instrument whose scale is longer by so much.

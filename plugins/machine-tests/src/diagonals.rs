@@ -12,7 +12,7 @@
 use runout_core::{
     Error, ErrorKind, Result,
     consistency::Check,
-    draws::{Draw, Truth, seed},
+    draws::{Draw, MeasuredAgain, Truth, seed},
     fault::Fault,
     pipeline::{Context, StageConfig},
     points::{
@@ -211,8 +211,8 @@ impl PointSeparator for Diagonals {
                 of.push((*kind).to_owned());
             }
         }
-        let error = |truth: Truth, draw: &mut Draw| self.errors(&all, &members, &found, truth, draw);
-        let mut values = with_uncertainty(&computed, "um", seed(&["diagonals"]), error);
+        let measure = |truth: Truth, draw: &mut Draw| self.again(&all, &members, &found, truth, draw);
+        let mut values = with_uncertainty(&computed, "um", seed(&["diagonals"]), measure);
         let copied = |of: &str| {
             let silent = |one: &Diagonal| one.noise.copies;
             all.iter().any(|one| (one.id == of || one.is_of(of)) && silent(one))
@@ -266,32 +266,39 @@ impl PointSeparator for Diagonals {
 }
 
 impl Diagonals {
-    fn errors(
+    fn again(
         &self,
         all: &[Diagonal],
         members: &[Vec<(usize, usize, &Diagonal)>],
         found: &[Vec<f64>],
         truth: Truth,
         draw: &mut Draw,
-    ) -> Vec<f64> {
+    ) -> MeasuredAgain {
         // µm/m of mm is nm.
         let scale = 1e-3 * self.0.scale_std_ppm * draw.normal();
         let mut drawn = |one: &Diagonal| {
             let cells = one.cells.may_be(truth, &one.least, &one.noise, draw);
-            cells.errors(&one.approaches, &one.noise, scale, draw)
+            cells.again(&one.approaches, &one.noise, scale, draw)
         };
-        let errors: Vec<Vec<f64>> = all.iter().map(&mut drawn).collect();
-        let mut each: Vec<f64> = errors.concat();
+        let drawn: Vec<MeasuredAgain> = all.iter().map(&mut drawn).collect();
+        let is_least = truth == Truth::Least;
+        let mut each = MeasuredAgain {
+            truth: drawn.iter().flat_map(|one| one.truth.iter().copied()).collect(),
+            error: drawn.iter().flat_map(|one| one.error.iter().copied()).collect(),
+        };
         for of in members {
             let top = largest(of.iter().map(|(index, place, _)| found[*index][*place]));
-            let error = if truth == Truth::Least {
+            let truth = largest(of.iter().map(|(index, place, _)| drawn[*index].truth[*place]));
+            let error = if is_least {
                 // Any of those that noise may have kept from being the largest: the one that it raises most.
                 let near = of.iter().filter(|(index, place, one)| found[*index][*place] + one.reach() >= top);
-                largest(near.map(|(index, place, _)| errors[*index][*place]))
+                largest(near.map(|(index, place, _)| drawn[*index].error[*place]))
             } else {
-                largest(of.iter().map(|(index, place, _)| found[*index][*place] + errors[*index][*place])) - top
+                largest(of.iter().map(|(index, place, _)| drawn[*index].truth[*place] + drawn[*index].error[*place]))
+                    - truth
             };
-            each.push(error);
+            each.truth.push(truth);
+            each.error.push(error);
         }
         each
     }

@@ -1,7 +1,7 @@
 //! Values of a test with their uncertainties.
 
 use runout_core::{
-    draws::{Draw, Truth, Uncertainty, measured_again},
+    draws::{Draw, MeasuredAgain, Truth, Uncertainty, measured_again},
     summary::Value,
 };
 
@@ -15,12 +15,12 @@ pub(crate) struct Computed {
     pub least: f64,
 }
 
-/// Values with their uncertainties. `error` measures a machine again, and gives what the values are then off by.
+/// Values with their uncertainties. `measure` measures a machine again.
 pub(crate) fn with_uncertainty(
     computed: &[Computed],
     unit: &str,
     seed: u64,
-    error: impl Fn(Truth, &mut Draw) -> Vec<f64>,
+    measure: impl Fn(Truth, &mut Draw) -> MeasuredAgain,
 ) -> Vec<Value> {
     let numbers: Vec<f64> = computed.iter().map(|computed| computed.value).collect();
     let with = |(computed, known): (&Computed, Uncertainty)| {
@@ -30,5 +30,5 @@ pub(crate) fn with_uncertainty(
         }
         if computed.is_key { value.key() } else { value }
     };
-    computed.iter().zip(measured_again(&numbers, seed, error)).map(with).collect()
+    computed.iter().zip(measured_again(&numbers, seed, measure)).map(with).collect()
 }

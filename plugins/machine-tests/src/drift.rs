@@ -34,7 +34,7 @@ use runout_core::{
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use course::{OF_SECOND_DIFFERENCES, levels, noise_of, range, smoothed, stable_after, within_ends};
+use course::{OF_SECOND_DIFFERENCES, levels, noise_of, range, rounding_of, smoothed, stable_after, within_ends};
 
 /// Means that a test has at least: fewer show neither their noise nor a course.
 const FEWEST_MEANS: usize = 20;
@@ -199,7 +199,7 @@ impl Drift {
         };
         let last = test.times_min.len() - 1;
         let minutes = |place: usize| test.times_min[place.min(last)] - test.times_min[0];
-        let noise_um = AT_MOST * axis.noise_um / ((2 * BESIDE + 1) as f64).sqrt();
+        let noise_um = AT_MOST * axis.noise_um / ((2 * BESIDE + 1) as f64).sqrt() + axis.rounding_um;
         let at = |band_um: f64| stable_after(&axis.smooth, band_um);
         let earliest = at(band_um + noise_um).unwrap_or(after).saturating_sub(BESIDE + 1);
         let latest = at(band_um - noise_um).unwrap_or(last) + 1;
@@ -228,6 +228,8 @@ struct Axis {
     means: Vec<f64>,
     smooth: Vec<f64>,
     noise_um: f64,
+    /// By how much readings may be rounded that stay as they are for most of the time.
+    rounding_um: f64,
     /// Readings that are far from the others of their window.
     left_out: usize,
 }
@@ -319,8 +321,10 @@ impl Test {
         let axes: Vec<Axis> = AXES
             .iter()
             .filter_map(|(column, name)| {
-                let (means, left_out) = windows(points.column(column).ok()?);
-                Some(Axis { name, smooth: smoothed(&means, BESIDE), noise_um: noise_of(&means), means, left_out })
+                let readings = points.column(column).ok()?;
+                let (means, left_out) = windows(readings);
+                let (noise_um, rounding_um) = (noise_of(&means), rounding_of(readings));
+                Some(Axis { name, smooth: smoothed(&means, BESIDE), noise_um, rounding_um, means, left_out })
             })
             .collect();
         if axes.is_empty() {

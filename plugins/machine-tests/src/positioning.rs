@@ -153,13 +153,13 @@ impl PointSeparator for Positioning {
         let scale = self.0.scale_std_ppm * if self.0.rotary { 3.6e-3 } else { 1e-3 };
         let noise = approaches.noise();
         let least = cells.levelled(&noise, approaches.targets.len());
-        let error = |truth: Truth, draw: &mut Draw| {
+        let measure = |truth: Truth, draw: &mut Draw| {
             let cells = cells.may_be(truth, &least, &noise, draw);
             let scale = scale * draw.normal();
-            cells.errors(&approaches, &noise, scale, draw)
+            cells.again(&approaches, &noise, scale, draw)
         };
         let seed = seed(&["positioning", &self.0.axis]);
-        let mut values = with_uncertainty(&computed, deviation.unit, seed, error);
+        let mut values = with_uncertainty(&computed, deviation.unit, seed, measure);
         if noise.copies {
             // Copies show no uncertainty.
             values.iter_mut().for_each(|value| value.uncertainty = None);

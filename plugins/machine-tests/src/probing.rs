@@ -16,7 +16,7 @@ mod range;
 use runout_core::{
     Error, ErrorKind, Result,
     consistency::groups::{Level, alike},
-    draws::{Draw, Truth, seed, without_noise},
+    draws::{Draw, MeasuredAgain, Truth, seed, without_noise},
     fault::Fault,
     pipeline::{Context, StageConfig},
     points::{
@@ -249,7 +249,7 @@ impl Probing {
             touches.fit.remove_from(&mut set);
             range(&set)
         };
-        let error = |truth: Truth, draw: &mut Draw| {
+        let measure = |truth: Truth, draw: &mut Draw| {
             let std = std * draw.true_std_ratio(freedom);
             let means: Vec<f64> = match truth {
                 Truth::Least => least.clone(),
@@ -258,10 +258,10 @@ impl Probing {
             };
             let mut mean_of = |sets: usize| (0..sets).map(|_| one_set(&means, std, draw)).sum::<f64>() / sets as f64;
             let truth = mean_of(SETS);
-            vec![mean_of(count) - truth]
+            MeasuredAgain { error: vec![mean_of(count) - truth], truth: vec![truth] }
         };
         let computed = [Computed { symbol: symbol.into(), value, about, is_key: true, least: 0.0 }];
-        with_uncertainty(&computed, "um", seed(&["probing", symbol]), error).pop().unwrap_or(plain)
+        with_uncertainty(&computed, "um", seed(&["probing", symbol]), measure).pop().unwrap_or(plain)
     }
 }
 

@@ -12,7 +12,7 @@
 
 use runout_core::{
     Error, ErrorKind, Result,
-    draws::{Draw, Truth, seed},
+    draws::{Draw, MeasuredAgain, Truth, seed},
     fault::Fault,
     pipeline::{Context, StageConfig},
     points::{
@@ -358,13 +358,14 @@ impl PointSeparator for RotaryPath {
                     least: 0.0,
                 })
                 .collect();
-            let error = |truth: Truth, draw: &mut Draw| {
+            let measure = |truth: Truth, draw: &mut Draw| {
                 let cells = cells.may_be(truth, &least, &noise, draw);
-                let errors = cells.errors(approaches, &noise, 0.0, draw);
-                used.iter().map(|(at, _)| errors[*at]).collect()
+                let all = cells.again(approaches, &noise, 0.0, draw);
+                let [truth, error] = [all.truth, all.error].map(|all| used.iter().map(|(at, _)| all[*at]).collect());
+                MeasuredAgain { truth, error }
             };
             let seed = seed(&["rotary-path", test, &course.ball, course.direction]);
-            let found = with_uncertainty(&computed, "um", seed, error);
+            let found = with_uncertainty(&computed, "um", seed, measure);
             values.extend(found.into_iter().map(|mut value| {
                 if noise.copies {
                     value.uncertainty = None;

@@ -136,6 +136,29 @@ fn intervals_of_positioning_hold_the_truth() {
     assert!(worst >= least, "{worst}");
 }
 
+/// Runs that are off from one side hide a reversal value that is not there: its interval is as wide as what they hide.
+#[test]
+fn a_reversal_value_near_zero_is_not_known_better_than_its_runs() {
+    let targets: Vec<f64> = (0..11).map(|index| 50.0 * f64::from(index)).collect();
+    let axis = Axis { noise_um: 0.1, of_run_um: 0.0, of_side_um: 0.8, backlash_um: 1.0 };
+    let truth_um = targets
+        .iter()
+        .map(|target| (axis.mean_um(*target, 1.0) - axis.mean_um(*target, -1.0)) / targets.len() as f64)
+        .sum::<f64>();
+    let mut chance = Chance(ChaCha8Rng::seed_from_u64(11));
+    let trials = crate::trials::trials(300);
+    let (mut near, mut held) = (0, 0);
+    for _ in 0..trials {
+        let (value, _, [low, high]) = number(&axis.measured(&mut chance, &targets, 3), "B_mean");
+        if value < 0.3 {
+            near += 1;
+            held += usize::from((low..=high).contains(&truth_um));
+        }
+    }
+    println!("near 0: {near} of {trials}, held {held}");
+    assert!(near >= trials / 20 && held * 10 >= near * 9, "{held} of {near}");
+}
+
 /// An axis that warms up brings a part of it into the reversal value, which by its definition has none: its interval contains that.
 #[test]
 fn a_warm_up_is_in_the_interval_of_the_reversal_value() {

@@ -176,6 +176,15 @@ fn the_time_to_stability_is_that_of_the_course() {
     println!("simulated: stable after {minutes:.1} min ± {:?}, truth {expected:.1} min", stable.std());
     // A window is a minute.
     assert!((minutes - expected).abs() < 5.0 * stable.std().unwrap().max(0.5), "{minutes} for {expected}");
+    // Readings in whole µm stay as they are for minutes.
+    for seed in 0..8 {
+        let mut rounded = recorded(seed, 0.05);
+        let z = rounded.columns.iter_mut().find(|column| column.name == "z_um").unwrap();
+        z.values.iter_mut().for_each(|one| *one = one.round());
+        let found = separated("stable_um = 1.0", &rounded).unwrap();
+        let [earliest, latest] = value(&found, "stable-after", Some("Z")).interval_95().unwrap();
+        assert!((earliest..=latest).contains(&expected), "{seed}: {earliest} to {latest} for {expected}");
+    }
     let restless = separated("stable_um = 0.2", &recorded(3, 0.3)).unwrap();
     assert!(restless.values.iter().all(|value| value.symbol != "stable-after" || value.of.as_deref() != Some("Y")));
     assert!(restless.remarks.iter().any(|remark| remark.starts_with("Y is not stable")), "{:?}", restless.remarks);

@@ -231,6 +231,14 @@ fn what_is_odd_is_said() {
     let found = of(Object::Sphere, &copies);
     assert!(found.values[0].uncertainty.is_none());
     assert!(found.remarks.iter().any(|remark| remark.contains("copies show no uncertainty")), "{:?}", found.remarks);
+    // One set that is another one, elsewhere.
+    let mut again = usual.clone();
+    for (axis, off_mm) in [0.013, -0.02, 0.004].into_iter().enumerate() {
+        let first = again.numbers[axis][25..50].to_vec();
+        again.numbers[axis][75..].iter_mut().zip(first).for_each(|(at, first)| *at = first + off_mm);
+    }
+    let found = of(Object::Sphere, &again);
+    assert!(refuted(&found, "set 4 is equal to set 2, touch by touch"), "{:?}", found.checks);
     // One side that is noisier than the others, one set in µm, touches on a cap alone.
     let (mut loud, mut chance) = (usual.clone(), Chance::new(6));
     for (row, _) in on_sphere().iter().cycle().take(100).enumerate().filter(|(_, place)| place[0] > 0.7) {

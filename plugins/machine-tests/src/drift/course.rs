@@ -70,6 +70,16 @@ pub(super) fn noise_of(means: &[f64]) -> f64 {
     (if median > 0.0 { median } else { rms }) / OF_SECOND_DIFFERENCES.sqrt()
 }
 
+/// Half of the step of readings most of which are equal to the one before: noise does not show what lies between two steps. 0 of others.
+pub(super) fn rounding_of(readings: &[f64]) -> f64 {
+    let mut changes: Vec<f64> = readings.windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect();
+    changes.sort_by(f64::total_cmp);
+    if changes.get(changes.len() / 2).is_none_or(|usual| *usual > 0.0) {
+        return 0.0;
+    }
+    0.5 * changes.into_iter().find(|change| *change > 0.0).unwrap_or_default()
+}
+
 /// The first place from which on a course stays within a band about its mean over the last tenth; nothing where it leaves it there.
 pub(super) fn stable_after(course: &[f64], band_um: f64) -> Option<usize> {
     let end = course.len() - ((END * course.len() as f64) as usize).max(1);
