@@ -3,10 +3,13 @@
 use super::{
     Fit, Model,
     confounded::choices,
-    fit::Refit,
+    fit::{Refit, refit},
     judgement::{same_finding, unit},
     search::{SAME, Tracing},
 };
+
+/// Rounds of refits from elsewhere, at most: one effect after the other finds its place.
+const ROUNDS: usize = 3;
 
 impl<M: Model> Tracing<'_, M> {
     /// The best refit over all combinations of members, of which `current` is the first, and the others that are at most so
@@ -65,5 +68,20 @@ impl<M: Model> Tracing<'_, M> {
             return current;
         }
         self.combinations(model, current, f64::INFINITY).0
+    }
+
+    /// The best of `current` and of refits from [elsewhere](Model::elsewhere): an effect may have made up for one that was found after it.
+    pub(super) fn elsewhere(&self, model: &M, current: Refit<M::Fit>) -> Refit<M::Fit> {
+        let (known, mut best) = (self.settings.known.len(), current);
+        for _ in 0..if self.found.len() < 2 { 0 } else { ROUNDS } {
+            let starts = model.elsewhere(&best.fit, &best.settings, known).into_iter();
+            let others = starts.filter_map(|start| refit(model, start, known).ok());
+            let least = others
+                .filter(|other| !other.ends_at_bound && other.chi2 < best.chi2 * (1.0 - SAME))
+                .min_by(|one, other| one.chi2.total_cmp(&other.chi2));
+            let Some(least) = least else { break };
+            best = least;
+        }
+        best
     }
 }

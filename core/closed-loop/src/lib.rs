@@ -102,6 +102,12 @@ pub trait Model: Sync {
         None
     }
 
+    /// Other values of what is applied behind the first `known`, from which a refit may explain more now that another effect is there: of a model that
+    /// is far from linear.
+    fn elsewhere(&self, _fit: &Self::Fit, _applied: &[Setting], _known: usize) -> Vec<Vec<Setting>> {
+        Vec::new()
+    }
+
     /// The same model on all data, for the final results: what the loop holds out is part of them.
     fn whole(&self) -> &Self {
         self

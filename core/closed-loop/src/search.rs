@@ -90,6 +90,7 @@ pub fn diagnose<M: Model>(model: &M, settings: &Settings) -> Result<Closed<M::Fi
             }
         }
         current = tracing.choose_best(model, current);
+        current = tracing.elsewhere(model, current);
         if let Some(last) = tracing.found.last_mut() {
             last.after = current.fit.remainder().clone();
         }

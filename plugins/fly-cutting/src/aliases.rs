@@ -37,31 +37,50 @@ fn is_line(setting: &Setting) -> bool {
     MISSING.get(setting.effect).is_some_and(|missing| missing.line().is_some())
 }
 
+/// The same settings with a line at another ratio.
+pub(crate) struct OtherRatio {
+    ratio: f64,
+    /// By how much χ² promises to be worse.
+    worse: f64,
+    pub settings: Vec<Setting>,
+}
+
+/// Settings with each other ratio of the line at a place, the one that promises most first; nothing where there is no line.
+pub(crate) fn other_ratios(fit: &CutFit, settings: &[Setting], place: usize, highest: usize) -> Vec<OtherRatio> {
+    let Setting { effect, values } = &settings[place];
+    let (Some(tilts), &[ratio, amplitude, phase_deg]) =
+        (MISSING.get(*effect).and_then(|missing| missing.line()), &values[..])
+    else {
+        return Vec::new();
+    };
+    let line = Line { ratio, amplitude, phase: phase_deg.to_radians(), tilts };
+    let (promised, own) = fit.promising(line, highest);
+    let others = promised.into_iter().filter(|(other, ..)| (other - own).abs() >= 1e-3);
+    let with = |(ratio, amplitude, phase, worse): (f64, f64, f64, f64)| {
+        let mut settings = settings.to_vec();
+        settings[place].values = vec![ratio, amplitude, phase.to_degrees()];
+        OtherRatio { ratio, worse, settings }
+    };
+    others.map(with).collect()
+}
+
 fn of_line(model: &CutModel, closed: &mut Closed<CutFit>, known: usize, place: usize, highest: usize) -> Aliases {
     let Setting { effect, values } = closed.settings[place].clone();
     let mut aliases = Aliases { effect, ratios: Vec::new() };
-    let [ratio, amplitude, phase_deg] = values[..] else { return aliases };
-    let tilts = MISSING[effect].line() == Some(true);
-    let line = Line { ratio, amplitude, phase: phase_deg.to_radians(), tilts };
+    let Some(ratio) = values.first().copied() else { return aliases };
     let remainder = closed.after.remainder();
     let level = remainder.chi2_per_dof();
     let unit = if remainder.noise_is_known() { level.max(1.0) } else { level };
-    let (promised, own) = closed.after.promising(line, highest);
     let (mut refits, mut found, mut alike) = ([0, 0], Vec::new(), Vec::new());
-    for (other, amplitude, phase, worse) in promised {
-        if (other - own).abs() < 1e-3 {
-            continue;
-        }
+    for OtherRatio { ratio, worse, settings } in other_ratios(&closed.after, &closed.settings, place, highest) {
         let kind = usize::from(worse > REFITTED_CHI2 * unit);
         if refits[kind] >= MOST_REFITS[kind] {
             if worse < SAME_CHI2 * unit {
-                alike.push(other);
+                alike.push(ratio);
             }
             continue;
         }
         refits[kind] += 1;
-        let mut settings = closed.settings.clone();
-        settings[place].values = vec![other, amplitude, phase.to_degrees()];
         let Ok(trial) = refit(model.whole(), settings, known) else { continue };
         found.push(trial);
     }

@@ -17,6 +17,7 @@ use runout_core::{
 };
 
 use crate::{
+    aliases::other_ratios,
     cells::Cells,
     config::FlyCuttingConfig,
     effects::{MISSING, Missing, applied, tidy},
@@ -26,6 +27,8 @@ use crate::{
     search::{self, FEWEST_PERIODS, Left, Shift},
 };
 
+/// Other ratios of a line that are tried where another effect was found beside it.
+const ELSEWHERE: usize = 6;
 /// Points that the search looks at, and those of the final fit.
 const SEARCHED: usize = 160_000;
 const FITTED: usize = 640_000;
@@ -192,6 +195,23 @@ impl Model for CutModel {
             Missing::SpindleLine(_) | Missing::TiltLine => self.best_start(effect, applied, fit.starts(*missing)),
             _ => None,
         }
+    }
+
+    fn elsewhere(&self, fit: &CutFit, applied: &[Setting], known: usize) -> Vec<Vec<Setting>> {
+        let highest = self.data.config.max_frequency_ratio;
+        let of_line = |place: usize| other_ratios(fit, applied, place, highest).into_iter().take(ELSEWHERE);
+        // Shifts of the rows are searched anew beside what else was found.
+        let of_shift = |place: usize| {
+            let effect = applied[place].effect;
+            MISSING.get(effect).filter(|missing| self.data.searched(**missing).is_some())?;
+            let mut settings = applied.to_vec();
+            settings.remove(place);
+            let values = self.start(effect, &self.fit(&settings).ok()?, &settings)?;
+            settings.insert(place, Setting { effect, values });
+            Some(settings)
+        };
+        let lines = (known..applied.len()).flat_map(of_line).map(|other| other.settings);
+        lines.chain((known..applied.len()).filter_map(of_shift)).collect()
     }
 
     fn whole(&self) -> &Self {

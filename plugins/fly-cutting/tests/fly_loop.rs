@@ -18,6 +18,61 @@ fn clean_surfaces_name_nothing() {
     }
 }
 
+/// Of ratios whose spectra look alike, the one is said that all rows ask for.
+#[test]
+fn a_line_has_the_ratio_that_all_rows_ask_for() {
+    let cut = "nose_radius_mm = 10.0\nfeed_um_per_rev = 12.0\ncutter_radius_mm = 80.0\nspeed_rpm = 800.0\n";
+    let grid = "[grid]\nrows = 160\ncolumns = 160\nstep_x_mm = 0.001453\nstep_y_mm = 0.029167\norigin_x_mm = -0.185\n";
+    let line =
+        "[[effect]]\nplugin = 'spindle-line'\nfrequency_ratio = 1.267388\namplitude_nm = 1.2535\nphase_deg = 142.26\n";
+    let map = of(&format!("noise_nm = 0.1\nseed = 5\n{line}[cut]\n{cut}{grid}"));
+    let found = diagnose(map.heights().unwrap(), &separator(cut)).diagnosis;
+    let [added] = &found.added[..] else { panic!("{}", listing(&found)) };
+    let [ratio, std] = parameter(added, "frequency_ratio");
+    assert!((ratio - 1.267_388).abs() < 4.0 * std && std < 1e-4, "{ratio} ± {std}");
+}
+
+/// A line is found before the radius that is declared wrongly, and its ratio may make up for that: it is looked for once more beside it.
+#[test]
+fn a_line_beside_a_wrong_radius_has_its_ratio() {
+    let cases = [
+        (
+            "nose_radius_mm = 3.0\nfeed_um_per_rev = 6.0\nspeed_rpm = 390.0\n",
+            [300, 200],
+            0.02365,
+            250.0,
+            -13.07,
+            [3.30043, 4.76, 85.2],
+        ),
+        (
+            "nose_radius_mm = 6.0\nfeed_um_per_rev = 8.3\nspeed_rpm = 390.0\n",
+            [160, 200],
+            0.0254,
+            150.0,
+            -5.29,
+            [1.24748, 2.77, 140.8],
+        ),
+    ];
+    for (cut, [columns, rows], step_y_mm, radius_mm, off_mm, [ratio, amplitude_nm, phase_deg]) in cases {
+        let of_cut = |radius_mm: f64| format!("{cut}cutter_radius_mm = {radius_mm}\n");
+        let step_x_mm = 1.4e-3;
+        let grid = format!(
+            "[grid]\nrows = {rows}\ncolumns = {columns}\nstep_x_mm = {step_x_mm}\nstep_y_mm = {step_y_mm}\norigin_y_mm = 3.0\n"
+        );
+        let line = format!(
+            "[[effect]]\nplugin = 'spindle-line'\nfrequency_ratio = {ratio}\namplitude_nm = {amplitude_nm}\nphase_deg = {phase_deg}\n"
+        );
+        let map = of(&format!("noise_nm = 0.1\nseed = 5\n{line}[cut]\n{}{grid}", of_cut(radius_mm + off_mm)));
+        let found = diagnose(map.heights().unwrap(), &separator(&of_cut(radius_mm))).diagnosis;
+        println!("{}", listing(&found));
+        let line = found.added.iter().find(|added| added.effect == "spindle-line").unwrap();
+        let alias = format!("frequency_ratio {ratio:.3}");
+        let is_found = (parameter(line, "frequency_ratio")[0] - ratio).abs() < 1e-3
+            || line.confounded_with.iter().any(|other| other.contains(&alias));
+        assert!(is_found && found.added.len() == 2, "{ratio}: {}", listing(&found));
+    }
+}
+
 /// Passes at the edge of the map, and narrow ones, have fewer points.
 #[test]
 fn passes_of_unequal_width_are_no_finding() {
