@@ -7,6 +7,7 @@ use super::{
     Bias, Effect, Fit, LookedAt, Model, Remainder, Setting,
     diagnosis::{BiasPerUnit, Blind},
     fit::INDEPENDENT,
+    judgement::named_from,
     report::{VISIBLE, blind},
 };
 use runout_error::Result;
@@ -42,7 +43,8 @@ pub struct Visible {
 pub struct VisibleFrom {
     /// The parameter.
     pub name: String,
-    /// The size at which it is three standard deviations of the noise.
+    /// The size from which the loop names it in most measurements of data like these: six standard deviations of the noise, and nine with 6000 data. With
+    /// other phases of form and motion it may be half or twice as much.
     pub visible_from: f64,
     /// The size that could usually be expected.
     pub tolerance: f64,
@@ -88,6 +90,7 @@ impl Foresight {
 pub fn foresee<M: Model>(model: &M) -> Result<Foresight> {
     let effects = model.effects();
     let fit = Kept::new(model.fit(&[])?, effects.len());
+    let named = named_from(fit.remainder().residual.len());
     let all: Vec<usize> = (0..effects.len()).filter(|effect| !model.is_mistake(*effect)).collect();
     let mut blind_to: Vec<NotVisible> = Vec::new();
     for blind in blind(effects, &all, &fit) {
@@ -121,7 +124,7 @@ pub fn foresee<M: Model>(model: &M) -> Result<Foresight> {
         let found = Columns::new(effect, fit.signature(index));
         let parameters = effect.parameters.iter().zip(&found.sized).map(|(parameter, column)| VisibleFrom {
             name: parameter.name.clone(),
-            visible_from: VISIBLE * parameter.tolerance / norm(column),
+            visible_from: named * parameter.tolerance / norm(column),
             tolerance: parameter.tolerance,
             unit: parameter.unit.clone(),
         });

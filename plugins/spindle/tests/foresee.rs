@@ -6,7 +6,11 @@
 use crate::campaigns::{averaged, campaign};
 use crate::common::{FOUR_SENSORS, rig};
 use runout_core::{
-    closed_loop::{Settings, diagnosis::Diagnosis, foresight::Foresight},
+    closed_loop::{
+        Settings,
+        diagnosis::{Added, Diagnosis},
+        foresight::Foresight,
+    },
     rig::Rig,
 };
 use runout_spindle::{
@@ -132,8 +136,8 @@ fn an_assumption_that_fails_would_show() {
     assert!(shows(true) && !shows(false));
 }
 
-fn diagnosed(planted: &str) -> Diagnosis {
-    let config = campaign(7, planted);
+fn diagnosed(seed: u64, planted: &str) -> Diagnosis {
+    let config = campaign(seed, planted);
     let rig = config.rig.clone().check().unwrap();
     let (station, _) = averaged(&config, &rig);
     let layout = Layout::new(&rig, false);
@@ -141,11 +145,11 @@ fn diagnosed(planted: &str) -> Diagnosis {
     diagnose(Selection::whole(&rig), layout, true, effects::all(), &[station], &settings).unwrap().diagnosis
 }
 
-/// Effects of three times the size from which they are said to be visible are found, and confounded as foreseen.
+/// Effects of twice the size from which they are said to be visible are found, and confounded as foreseen.
 #[test]
 fn the_loop_finds_what_was_foreseen() {
     let foresight = foresee_rig(&campaign(7, "[]").rig.check().unwrap()).unwrap();
-    let size = |effect: &str, target: &str| 3.0 * visible_from(&foresight, effect, Some(target));
+    let size = |effect: &str, target: &str| 2.0 * visible_from(&foresight, effect, Some(target));
     let campaigns = [
         ("sensor-gain", "S1", format!(r#""relative_gain":{}"#, size("sensor-gain", "S1"))),
         ("sensor-angle", "S3", format!(r#""angle_deg":{}"#, size("sensor-angle", "S3"))),
@@ -154,7 +158,7 @@ fn the_loop_finds_what_was_foreseen() {
         ("sensor-nonlinearity", "S2", format!(r#""quadratic_per_um":{}"#, size("sensor-nonlinearity", "S2"))),
     ];
     for (effect, target, value) in campaigns {
-        let found = diagnosed(&format!(r#"[{{"plugin":"{effect}","targets":["{target}"],{value}}}]"#));
+        let found = diagnosed(7, &format!(r#"[{{"plugin":"{effect}","targets":["{target}"],{value}}}]"#));
         let name = format!("{effect} {target}");
         println!("simulated, {name} with {value}: {:?}", found.added);
         let [added] = &found.added[..] else { panic!("{name}: {:?}, refused {:?}", found.added, found.refused) };
@@ -165,4 +169,25 @@ fn the_loop_finds_what_was_foreseen() {
         // What was foreseen to look the same does; at small sizes more may.
         assert!(foreseen.is_none_or(|foreseen| foreseen.iter().all(|member| set.contains(member))), "{name}: {set:?}");
     }
+}
+
+/// An effect of the size from which it is said to be visible is named in every second campaign, alone or in a set, and of twice the size in nearly all:
+/// what it does depends on the phases of form and motion.
+#[test]
+fn what_is_visible_is_named() {
+    let foresight = foresee_rig(&campaign(7, "[]").rig.check().unwrap()).unwrap();
+    let visible_from = visible_from(&foresight, "sensor-gain", Some("S1"));
+    let named = |gain: f64| {
+        let planted = format!(r#"[{{"plugin":"sensor-gain","targets":["S1"],"relative_gain":{gain}}}]"#);
+        let is_named = |seed: &u64| {
+            let found = diagnosed(*seed, &planted).added;
+            let names =
+                |one: &Added| one.effect == "sensor-gain" || one.confounded_with.join(" ").contains("sensor-gain");
+            found.iter().any(names)
+        };
+        (20..32).filter(is_named).count()
+    };
+    let [once, twice] = [1.0, 2.0].map(|times| named(times * visible_from));
+    println!("a gain of {visible_from}: named in {once} of 12, of twice the size in {twice}");
+    assert!(once >= 3 && twice >= 11, "{once} {twice}");
 }
