@@ -3,7 +3,11 @@
 use runout_core::{
     closed_loop::{Setting, tested::Tested},
     consistency::{Check, Kind, LinearFit, Structure, Test, check::FINDING, judge},
-    numerics::{least_squares::Basis, statistics::f_tail},
+    numerics::{
+        least_squares::{Basis, dot},
+        number::significant,
+        statistics::f_tail,
+    },
 };
 
 use crate::{contrasts::TraceErrors, model::TracesFit, straightness::Straightness, trace::AxialTrace};
@@ -33,15 +37,14 @@ impl TracesFit {
             let mut tested = Tested::of(self, &free, &self.design.data.effects, scale, "µm");
             // Single readings are named in their traces.
             tested.checks.retain(|check| check.test != Test::Rows);
-            if tested.models.is_none() {
-                tested.checks.extend(self.of_traces());
-            }
+            let of_traces = self.of_traces(tested.models.is_some());
+            tested.checks.extend(of_traces);
             tested
         })
     }
 
-    /// Traces of independent errors against each other, and their single readings.
-    fn of_traces(&self) -> Vec<Check> {
+    /// Traces against each other, and their single readings where their errors are independent.
+    fn of_traces(&self, is_correlated: bool) -> Vec<Check> {
         let data = &self.design.data;
         let left = self.design.left_by_splines().map(f64::sqrt);
         let scale = data.std_um.unwrap_or(1.0);
@@ -52,6 +55,9 @@ impl TracesFit {
         }
         let lines = Basis::of(self.design.lines());
         lines.remove_from(&mut residual);
+        if is_correlated {
+            return self.unlike(&residual).into_iter().collect();
+        }
         let traces = self.design.readings.of.iter().map(|(trace, _)| *trace).collect();
         let names = data.traces.iter().map(|trace| format!("trace {}", trace.id)).collect();
         let row = |(trace, point): &(usize, usize)| {
@@ -72,8 +78,45 @@ impl TracesFit {
         judge(fit, &structure).checks
     }
 
+    /// The trace that is least like the others of its setup, whose scatter is that without it. Of its readings so many are independent as its own
+    /// correlation along z leaves. `residual` has the variance of single readings.
+    fn unlike(&self, residual: &[f64]) -> Option<Check> {
+        let data = &self.design.data;
+        let traces: Vec<Vec<f64>> = (0..data.traces.len())
+            .map(|trace| {
+                let own = self.design.readings.of.iter().zip(residual).filter(|((of, _), _)| *of == trace);
+                own.map(|(_, value)| *value).collect()
+            })
+            .collect();
+        let size = |setup: usize| data.setups.iter().filter(|of| **of == setup).count() as f64;
+        let squares: Vec<f64> = traces.iter().map(|trace| dot(trace, trace) / trace.len().max(1) as f64).collect();
+        let all: f64 =
+            squares.iter().zip(&data.setups).map(|(square, setup)| square * (1.0 - 1.0 / size(*setup))).sum();
+        let others = [0, 1].iter().map(|setup| (size(*setup) - 1.0).max(0.0)).sum::<f64>() - 1.0;
+        let judged = (0..traces.len()).filter(|trace| size(data.setups[*trace]) > 2.0).map(|trace| {
+            let ratio = squares[trace] * others / (all - squares[trace]).max(f64::MIN_POSITIVE);
+            let independent = (traces[trace].len() as f64 - 2.0) * independent_share(&traces[trace]);
+            let dof = [independent, others * independent];
+            (trace, ratio, dof, (f_tail(ratio, dof[0], dof[1]) * traces.len() as f64).min(1.0))
+        });
+        let (trace, ratio, dof, p) = judged.min_by(|one, other| one.3.total_cmp(&other.3))?;
+        let name = format!("trace {}", data.traces[trace].id);
+        Some(Check::new(Test::Alike, &name, ratio, &dof, p).finding(|| {
+            let times = significant(ratio.sqrt(), 2);
+            format!("{name} is off the others of its setup by {times} times what these are off each other: look at its sign, its setup and the direction of z")
+        }))
+    }
+
     /// Errors of one trace, where they depend on each other along z.
     pub(crate) fn trace_errors(&self) -> Option<TraceErrors> {
         self.judged().models.as_ref().map(|models| self.contrasts.trace_errors(models))
     }
+}
+
+/// Share of the readings of a series that is independent, for its variance: 1/Σρ² over the lags to half of it, of its own autocorrelation.
+fn independent_share(series: &[f64]) -> f64 {
+    let power = dot(series, series);
+    let correlation = |lag: usize| dot(&series[lag..], &series[..series.len() - lag]) / power;
+    let squares: f64 = (1..series.len() / 2).map(|lag| correlation(lag).powi(2)).sum();
+    if power > 0.0 { 1.0 / (1.0 + 2.0 * squares) } else { 1.0 }
 }
