@@ -219,14 +219,15 @@ impl SpatialError {
         let solution = solve(campaign, &self.config, &all)?;
         let size = |wanted: &Term| solution.column(*wanted).map_or(f64::NAN, |column| solution.joint.trend[column]);
         let each = columns.iter().map(|wanted| (wanted, size(wanted))).filter(|(_, size)| size.is_finite());
-        let adds = |place: &[f64; 3]| {
-            let of = |(wanted, size): (&Term, f64)| wanted.at(&campaign.volume, *place, 0.0).map(|adds| adds * size);
+        let adds = |(place, time): (&usize, &f64)| {
+            let at_mm = campaign.places_mm[*place];
+            let of = |(wanted, size): (&Term, f64)| wanted.at(&campaign.volume, at_mm, *time).map(|adds| adds * size);
             each.clone().map(of).fold([0.0; 3], |sum, one| [0, 1, 2].map(|axis| sum[axis] + one[axis]))
         };
-        let squares: f64 = campaign.places_mm.iter().flat_map(adds).map(|adds| adds * adds).sum();
+        let squares: f64 = campaign.place_of.iter().zip(&campaign.time).flat_map(adds).map(|adds| adds * adds).sum();
         Ok(Left {
             by_um: solution.by_axis(columns.iter().map(size), f64::NAN),
-            rms_um: (squares / (campaign.measured.len() * campaign.places_mm.len()) as f64).sqrt(),
+            rms_um: (squares / (campaign.measured.len() * campaign.place_of.len()) as f64).sqrt(),
         })
     }
 

@@ -33,6 +33,8 @@ const LEFT: f64 = 0.15;
 /// What is said of a jump that a step of the tracker explains as well.
 const IN_TIME_OR_SPACE: &str =
     "or the tracker moved at that time: readings in another order of the places distinguish them";
+/// What is said of a step of the tracker that a steady drift explains as well.
+const STEP_OR_DRIFT: &str = "or the readings drift: passes in another order of the places distinguish them";
 /// Jumps at most.
 const MOST_JUMPS: usize = 4;
 
@@ -275,6 +277,9 @@ impl<'a> Tracing<'a> {
             undecided = Some(IN_TIME_OR_SPACE.into());
             (jump, index, gain, estimate) = of_space.clone();
         }
+        if undecided.is_none() && !jump && matches!(self.candidates[index].shape, Shape::From(_)) {
+            undecided = self.drifts_as_well(state, gain).then(|| STEP_OR_DRIFT.into());
+        }
         let mut members = vec![index];
         if !jump {
             let own = self.candidates[index].effect;
@@ -301,6 +306,17 @@ impl<'a> Tracing<'a> {
         let mut found = state.found.clone();
         found.push(TracedEffect { members, jump, undecided, gain });
         Some(State { found, families: state.families.clone(), estimate })
+    }
+
+    /// Whether a steady drift of all components explains as much as a step of the tracker: in two passes of one order, what the readings do within a pass
+    /// may be the machine.
+    fn drifts_as_well(&self, state: &State, step: Gain) -> bool {
+        let known = self.terms(&state.found);
+        let drifts = self.campaign.measured.iter().map(|axis| Term::Drift(*axis));
+        let drifts: Vec<Term> = drifts.filter(|drift| !known.contains(drift)).collect();
+        let Some(estimate) = self.refit(&[known, drifts.clone()].concat(), state) else { return false };
+        let likelihood = 2.0 * (estimate.ln_likelihood - state.estimate.ln_likelihood);
+        !drifts.is_empty() && self.gain(likelihood, drifts.len(), 1).bic - step.bic < SAME_BIC
     }
 
     pub(crate) fn is_searched(&self, candidate: usize) -> bool {

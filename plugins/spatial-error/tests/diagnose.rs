@@ -2,12 +2,16 @@
 
 #![allow(clippy::unwrap_used, reason = "tests")]
 
+use std::f64::consts::PI;
+
 use crate::support::{scenario, separator};
 use runout_core::{
     closed_loop::{
         Setting, Settings,
         diagnosis::{Diagnosis, Verdict},
     },
+    consistency::Check,
+    points::Points,
     stage::PointSeparator,
 };
 use runout_spatial_error::simulate::{Scenario, SimulatedEffect};
@@ -47,6 +51,8 @@ fn effects_are_found_with_their_values() {
     let target = |name: &str| [name.to_owned()];
     let cases = [
         (SimulatedEffect::Scale { targets: target("Y"), scale_um_per_m: 150.0 }, "scale", "Y", 150.0),
+        // Four heights do not tell a scale from a positioning error of a higher order: the scale is the simpler one.
+        (SimulatedEffect::Scale { targets: target("Z"), scale_um_per_m: 90.0 }, "scale", "Z", 90.0),
         (SimulatedEffect::Squareness { targets: target("XZ"), angle_urad: -120.0 }, "squareness", "XZ", -120.0),
         (
             SimulatedEffect::Positioning { targets: target("EXX"), order: 3, amplitude_um: 15.0 },
@@ -121,4 +127,34 @@ fn without_noise_from_elsewhere_nothing_is_at_its_floor() {
     let found = diagnose(&Scenario { passes: 1, ..scenario(51) }, COARSE);
     assert_eq!(found.verdict, Verdict::NothingFound, "{:?}", found.added);
     assert!(found.before.noise_floor_um.is_none());
+}
+
+/// Readings of a machine that is sound, changed: for each reading its time as a share of all, and its place in the file.
+fn changed(seed: u64, change: impl Fn(f64, usize) -> f64) -> Points {
+    let mut points = scenario(seed).simulate().points();
+    let column = points.columns.iter_mut().find(|column| column.name == "dx_um").unwrap();
+    let count = column.values.len() as f64;
+    column.values.iter_mut().enumerate().for_each(|(row, value)| *value += change(row as f64 / count, row));
+    points
+}
+
+/// A sine is none of the effects: what is added beside it, and what is left, is not called explained.
+#[test]
+fn what_the_data_contradict_is_not_explained() {
+    let settings = Settings { max_added: 40, ..Settings::default() };
+    let points = changed(61, |share, _| 9.0 * (3.0 * PI * share).sin());
+    let found = separator(COARSE).model().unwrap().diagnose(&points, &settings).unwrap().diagnosis;
+    assert_eq!(found.verdict, Verdict::Unexplained, "{:?} {:?}", found.added, found.after.chi2_per_dof);
+}
+
+/// Two readings of a place that differ do not say which of them is wrong.
+#[test]
+fn one_bad_reading_of_a_place_that_was_read_twice_is_named_with_both_rows() {
+    for (seed, off_um) in [(71, 200.0), (72, -40.0)] {
+        let points = changed(seed, |_, row| if row == 17 { off_um } else { 0.0 });
+        let found = separator(COARSE).separate(&points).unwrap();
+        let named = |check: &&Check| check.refutes() && check.finding.contains("row 18");
+        let said: Vec<&Check> = found.checks.iter().filter(named).collect();
+        assert!(said.iter().any(|check| check.finding.contains(" or row ")), "{:?}", found.checks);
+    }
 }

@@ -140,6 +140,22 @@ fn a_step_of_the_tracker_is_no_error_of_the_machine() {
     assert!(!found.added.iter().any(|added| added.effect == "tracker-step"), "{:?}", found.added);
 }
 
+/// Two passes of one order show what lies between them, and not what the readings do within one.
+#[test]
+fn a_steady_drift_is_no_step_of_the_tracker() {
+    let drift = |(target, drift_um): (&str, f64)| SimulatedEffect::ThermalDrift {
+        targets: [target.into()],
+        drift_um,
+        time_constant: None,
+    };
+    let effect = [("x", 7.0), ("y", -10.0), ("z", 5.0)].map(drift).into();
+    let found = diagnose(&Scenario { random_order: false, effect, ..scenario(75) }, "");
+    assert_eq!(found.verdict, Verdict::Unexplained, "{:?}", found.added);
+    assert!(!found.added.iter().any(|added| added.effect == "tracker-step"), "{:?}", found.added);
+    let left = found.unexplained.iter().find(|left| left.place.contains("or the readings drift")).unwrap();
+    assert!(left.rms_um > 1.0, "{left:?}");
+}
+
 #[test]
 fn passes_that_are_exchanged_in_the_file_are_named() {
     for (passes, said) in [([1, 2], "pass 1 and pass 2 are exchanged"), ([2, 2], "pass 2 are in reverse order")] {
