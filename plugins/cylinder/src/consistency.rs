@@ -188,4 +188,30 @@ mod tests {
         let half = circle(1, 720, 2.0).keep(&(0..720).map(|point| point < 360).collect::<Vec<bool>>());
         assert!(closes(&half, "circle").is_none());
     }
+
+    /// Harmonics of a circle of 720 points, to an order.
+    fn harmonics(orders: usize) -> Basis {
+        let angles = circle(0, 720, 0.0).angle_rad;
+        let waves = (1..=orders).flat_map(|order| [(order, 0.0), (order, 0.25 * TAU)]);
+        let column =
+            |(order, phase): (usize, f64)| angles.iter().map(|angle| (order as f64 * angle - phase).cos()).collect();
+        Basis::of(std::iter::once(vec![1.0; 720]).chain(waves.map(column)).collect())
+    }
+
+    #[test]
+    fn noise_that_a_low_pass_took_away_is_not_taken_for_none() {
+        let fitted = harmonics(60);
+        let said = (0..60).filter(|seed| hidden_noise(&circle(*seed, 720, 0.0), &fitted).is_some()).count();
+        assert!(said <= 1, "{said} of 60 circles without a low-pass");
+        let behind_low_pass = |orders: usize| {
+            let mut scan = circle(1, 720, 0.0);
+            let mut above = scan.deviation_um.clone();
+            harmonics(orders).remove_from(&mut above);
+            scan.deviation_um.iter_mut().zip(above).for_each(|(height, above)| *height -= above);
+            hidden_noise(&scan, &fitted).unwrap_or_default()
+        };
+        let [nothing, falling] = [50, 250].map(behind_low_pass);
+        assert!(nothing.contains("less than the noise of any instrument"), "{nothing}");
+        assert!(falling.contains("times the size of that at"), "{falling}");
+    }
 }

@@ -11,7 +11,10 @@ use std::{
 
 use arrow_array::{Array, cast::AsArray, types::Float64Type};
 use runout_core::{
-    closed_loop::{self, diagnosis::Diagnosis},
+    closed_loop::{
+        self,
+        diagnosis::{Diagnosis, Verdict},
+    },
     pipeline::{Pipeline, Registry, diagnose::diagnose, document::Sources, run::Silent},
     points::Points,
     stage::{LinearModel, PointSeparator},
@@ -278,6 +281,21 @@ fn strong_ellipses_are_corrected_exactly() {
         }
     }
     assert!(all > 14 && far <= 2, "{far} of {all}");
+}
+
+#[test]
+fn what_an_effect_explains_that_was_not_chosen_stays_unexplained() {
+    let mut random = Random(5);
+    let mut channels = perfect();
+    channels[1].harmonics[0].0 = 510.0;
+    channels[0].harmonics[2] = (6.0, 0.4);
+    let recording = recorded(&channels, 0.5, true, &mut random);
+    let (all, _) = corrected(&recording, None);
+    assert!(names(&all).contains(&"harmonic-3-forward"), "{:?}", names(&all));
+    let (some, _) = corrected(&recording, Some(&["quadrature-gain-and-angle"]));
+    assert_eq!(some.verdict, Verdict::Unexplained, "{:?}", names(&some));
+    let is_named = |place: &str| place.contains("harmonic") && place.contains("none of the chosen `effects`");
+    assert!(some.unexplained.iter().any(|left| is_named(&left.place)), "{:?}", some.unexplained);
 }
 
 #[test]

@@ -124,6 +124,19 @@ fn orders_above_those_declared_are_named() {
     assert!(found.added[0].parameters.iter().all(|parameter| parameter.std.is_none()));
 }
 
+/// An order of more waves than half of the directions is another name of a lower one: it is not named for what that leaves.
+#[test]
+fn orders_beyond_half_of_the_directions_are_not_named() {
+    // Where the ring alone is turned, the probe has the 24 directions of one setup.
+    let mut scenario = scenario(9, &setups(&[(0.0, 0.0), (100.0, 0.0), (217.0, 0.0)]));
+    (scenario.directions, scenario.repeats) = (24, 2);
+    scenario.probe.extra_lobing = vec![Wave { order: 18, amplitude_um: 3.0, phase_deg: 40.0 }];
+    let found = diagnosed(&scenario, 4, None).diagnosis;
+    println!("{:?} {:?}", found.verdict, named(&found));
+    let order = |name: &String| name.rsplit('-').next().and_then(|order| order.parse::<usize>().ok());
+    assert!(named(&found).iter().filter_map(order).all(|order| order < 12), "{:?}", named(&found));
+}
+
 /// Without a turned probe, the machine is in the lobing: blind, never a number.
 #[test]
 fn the_machine_is_blind_where_the_probe_is_not_turned() {
