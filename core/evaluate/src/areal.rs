@@ -75,6 +75,7 @@ pub fn add_areal(
         lost: lost.into_iter().collect(),
         half_power_upr: sections.iter().filter_map(|section| section.half_power_upr).reduce(f64::min),
         shows_weakened: sections.iter().any(Section::shows_weakened),
+        shows_absent: sections.iter().any(|section| section.absent_um > 0.0),
     };
     let used = sections.iter().map(|section| section.used).sum::<f64>() / sections.len().max(1) as f64;
     let there = 1.0 - map.missing() as f64 / map.heights_um().len() as f64;

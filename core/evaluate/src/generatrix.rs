@@ -118,6 +118,7 @@ impl<'a> Generatrix<'a> {
             lost: self.lost.clone(),
             half_power_upr: None,
             shows_weakened: false,
+            shows_absent: false,
         };
         labelled(labels.collect(), numbers, &filter.along_axis(), &held, coverage)
     }

@@ -82,6 +82,8 @@ struct Content {
     half_power_upr: Option<f64>,
     /// Whether there is form above that order, weakened.
     shows_weakened: bool,
+    /// Whether there is form above the highest order.
+    shows_absent: bool,
 }
 
 impl Content {
@@ -136,7 +138,8 @@ fn labelled(labels: Vec<Label>, found: Vec<NumberFound>, filter: &Filter, held: 
     let weakened_above_upr = held
         .half_power_upr
         .filter(|half| filter.asks_for_more_than(*half) || (held.shows_weakened && filter.passes_everything()));
-    let absent_above_upr = Some(held.all_to).filter(|order| filter.reaches_above(*order));
+    let absent_above_upr = Some(held.all_to)
+        .filter(|order| filter.reaches_above(*order) || (held.shows_absent && filter.passes_everything()));
     let known = labels.into_iter().zip(found).filter(|(_, found)| found.value.is_finite());
     known
         .map(|(label, NumberFound { value, uncertainty, no_uncertainty, raised_by_noise })| Value {

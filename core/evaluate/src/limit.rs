@@ -265,7 +265,7 @@ fn missing(value: &Value) -> Option<String> {
         return Some(format!("order {first} {of_band} not observable"));
     }
     if let Some(order) = value.absent_above_upr {
-        let said = format!("its filter passes more than a thousandth above order {order}, the highest that there is");
+        let said = format!("orders above {order}, the highest that there is, belong to it");
         let cut_off = value.band_upr[1];
         let remedy = value.filter.as_deref().is_some_and(|filter| filter.starts_with("Gaussian")) && cut_off < order;
         return Some(if remedy {

@@ -125,6 +125,7 @@ impl Form {
             lost: separation.lost_orders(unknown).into_iter().filter(|order| *order >= 2).collect(),
             half_power_upr: result.half_power_upr(),
             shows_weakened: false,
+            shows_absent: result.absent_um(section) > 0.0,
         };
         let variance = separation.noise_variance(unknown);
         let above = held.half_power_upr.map_or(usize::MAX, |half| half as usize + 1);

@@ -780,7 +780,7 @@ fn nothing_is_proven_of_a_filter_that_reaches_above_the_orders() {
     let lobe = [lobes(3, 0.22), lobes(300, 2.3)];
     let (decision, band, missing) = ront(500, &lobe[..1], 255);
     assert_eq!((decision, band), (Decision::Undecided, [2, 255]));
-    assert!(missing.unwrap().contains("above order 255"));
+    assert!(missing.unwrap().contains("orders above 255"));
     assert_eq!(ront(500, &lobe, 2047), (Decision::DoesNotConform, [2, 500], None));
     // 255 orders hold all of 50 UPR; 127 of them let 1.1 % of the next one go, and 157 less than 0.1 %.
     assert_eq!(ront(50, &lobe[..1], 255), (Decision::Conforms, [2, 50], None));

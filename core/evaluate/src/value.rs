@@ -65,8 +65,8 @@ pub struct Value {
     /// value's own filter passes a hundredth or more: what is above is not in the value; null where nothing is missing.
     #[serde(default)]
     pub weakened_above_upr: Option<f64>,
-    /// Highest order that there is, where the value's own filter passes a thousandth or more of those above: they are not in
-    /// the value; null where nothing is missing.
+    /// Highest order that there is, where the value's own filter passes a thousandth or more of those above, or everything and form shows there: they are
+    /// not in the value; null where nothing is missing.
     #[serde(default)]
     pub absent_above_upr: Option<usize>,
     /// The filter applied; none where none could be.

@@ -90,6 +90,7 @@ impl Wall {
             lost: lost.into_iter().collect(),
             half_power_upr,
             shows_weakened,
+            shows_absent: sections.iter().any(|section| section.absent_um > 0.0),
         };
         Self { angles: Angles::equal(count), count, radius_mm, placed, rings, held }
     }

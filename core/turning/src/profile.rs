@@ -64,6 +64,8 @@ pub struct Profile {
     pub responses: Vec<Response>,
     /// By how much interruptions of the part's surface are bridged beyond what the rig declares, at each end, in rad.
     pub bridged_beyond_rad: f64,
+    /// What the average leaves out above its highest order, beyond noise: root mean square in µm.
+    pub absent_um: f64,
     /// What the user should know of this capture.
     pub warnings: Vec<String>,
 }

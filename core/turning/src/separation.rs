@@ -152,13 +152,15 @@ pub struct SectionAt {
     pub declared_gaps: Gaps,
     /// Share of its readings that the form was computed from.
     pub used: f64,
+    /// Form above the highest order, which no value has, as far as it shows: root mean square in µm.
+    pub absent_um: f64,
 }
 
 impl SectionAt {
     /// A circle that was measured all around.
     #[must_use]
     pub fn whole(id: impl Into<String>, z_mm: f64) -> Self {
-        Self { id: id.into(), z_mm, gaps: Gaps::default(), declared_gaps: Gaps::default(), used: 1.0 }
+        Self { id: id.into(), z_mm, gaps: Gaps::default(), declared_gaps: Gaps::default(), used: 1.0, absent_um: 0.0 }
     }
 
     /// Share of the profile that was there: of so many equal angles, and of the readings.

@@ -37,6 +37,13 @@ impl StationResult {
         self.profiles.iter().filter_map(of).reduce(f64::min)
     }
 
+    /// Form of a section above the highest order, as far as it shows: root mean square in µm.
+    #[must_use]
+    pub fn absent_um(&self, section: usize) -> f64 {
+        let of_section = self.separation.sections.get(section).map_or(0.0, |at| at.absent_um);
+        self.profiles.iter().map(|profile| profile.absent_um).fold(of_section, f64::max)
+    }
+
     /// Share of the amplitude of an order that the filters before the averages pass, in the average where it is least.
     #[must_use]
     pub fn passed(&self, order: usize) -> f64 {

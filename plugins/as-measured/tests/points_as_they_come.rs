@@ -17,7 +17,7 @@ fn run(load: &str, separate: &str) -> Result<Summary, String> {
     );
     let pipeline =
         Pipeline::from_toml(&text, env!("CARGO_MANIFEST_DIR"), &registry).map_err(|error| error.to_string())?;
-    pipeline.run().map_err(|error| error.to_string())
+    pipeline.run().map_err(|error| format!("{error} ({})", error.advice().unwrap_or_default()))
 }
 
 fn rons(summary: &Summary) -> Vec<(Option<String>, f64)> {
@@ -125,4 +125,82 @@ fn heights_are_sections_or_a_helix() {
     assert!(scattered.contains("scattered"), "{scattered}");
     let one = of(120, 120, &|_| 1.0).map(|summary| names(&summary));
     assert!(one.as_ref().is_ok_and(|names| *names == ["circle"]), "{one:?}");
+}
+
+/// Normal enough: twelve uniform numbers.
+fn noise(state: &mut u64) -> f64 {
+    let mut uniform = || {
+        *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (*state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+    };
+    (0..12).map(|_| uniform()).sum()
+}
+
+/// RONt about LSCI of points of a circle, unfiltered, in µm: the summary, and the truth of all points without noise.
+fn circle(seed: u64, separate: &str, form_um: impl Fn(f64) -> f64, noise_um: f64) -> (Summary, f64) {
+    let mut state = seed;
+    let angles = (0..720).map(|point| TAU * f64::from(point) / 720.0);
+    let heights: Vec<f64> = angles.clone().map(&form_um).collect();
+    // Its level and its first order are no form.
+    let mean = |wave: &dyn Fn(f64) -> f64| {
+        heights.iter().zip(angles.clone()).map(|(height, angle)| height * wave(angle)).sum::<f64>() / 720.0
+    };
+    let [level, cosine, sine] = [mean(&|_| 1.0), 2.0 * mean(&f64::cos), 2.0 * mean(&f64::sin)];
+    let about = heights.iter().zip(angles.clone());
+    let about = about.map(|(height, angle)| height - level - cosine * angle.cos() - sine * angle.sin());
+    let (low, high) = about.fold((f64::MAX, f64::MIN), |(low, high), one| (low.min(one), high.max(one)));
+    let mut text = "angle_deg,deviation_um\n".to_owned();
+    for (angle, height) in angles.zip(&heights) {
+        writeln!(text, "{},{}", angle.to_degrees(), height + noise_um * noise(&mut state)).unwrap();
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let load = written(folder.path(), "circle.csv", &text);
+    (run(&load, &format!("object = 'roundness', radius_mm = 20.0, {separate}")).unwrap(), high - low)
+}
+
+/// A burr of one or two points is no noise: it is in the interval.
+#[test]
+fn intervals_hold_a_narrow_burr() {
+    let mut held = 0;
+    for seed in 0..12 {
+        let form = |angle: f64| {
+            let aside = (angle - TAU * (100.0 + seed as f64) / 720.0) / 0.3_f64.to_radians();
+            0.25 * (2.0 * angle + 0.4).cos() + 0.2 * (3.0 * angle).cos() + 1.5 * (-0.5 * aside * aside).exp()
+        };
+        let (summary, truth) = circle(seed, "", form, 0.1);
+        let placed = summary.placed_values();
+        let ront =
+            placed.iter().find(|one| one.value.symbol == "RONt" && one.value.reference.as_deref() == Some("LSCI"));
+        let [low, high] = ront.unwrap().value.interval_95().unwrap();
+        held += u32::from((low..=high).contains(&truth));
+    }
+    assert!(held >= 10, "{held} of 12");
+}
+
+/// Form above the highest order is in no value: what is unfiltered lacks it.
+#[test]
+fn form_above_the_highest_order_is_absent() {
+    for (size_um, absent) in [(0.3, Some(50)), (0.0, None)] {
+        let form = |angle: f64| (2.0 * angle).cos() + size_um * (80.0 * angle + 0.3).cos();
+        let (summary, _) = circle(3, "max_order = 50", form, 0.02);
+        let placed = summary.placed_values();
+        let ront = placed.iter().find(|one| one.value.symbol == "RONt").unwrap();
+        assert_eq!(ront.value.absent_above_upr, absent);
+        let is_said = summary.warnings.iter().any(|warning| warning.contains("order 80 has 0.30 µm, above 50"));
+        assert_eq!(is_said, absent.is_some(), "{:?}", summary.warnings);
+    }
+}
+
+#[test]
+fn angles_in_radians_and_texts_of_two_bytes_have_a_remedy() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut text = "angle_deg,radius_mm\n".to_owned();
+    (0..200).for_each(|point| writeln!(text, "{},{}", TAU * f64::from(point) / 200.0, 15.0).unwrap());
+    let refused = |load: &str| run(load, "object = 'roundness'").unwrap_err();
+    let found = refused(&written(folder.path(), "radians.csv", &text));
+    assert!(found.contains("in radians or turns"), "{found}");
+    let wide: Vec<u8> = std::iter::once(0xFEFF).chain(text.encode_utf16()).flat_map(u16::to_le_bytes).collect();
+    fs::write(folder.path().join("wide.csv"), wide).unwrap();
+    let found = refused(&format!("path = '{}'", folder.path().join("wide.csv").display()));
+    assert!(found.contains("UTF-16"), "{found}");
 }

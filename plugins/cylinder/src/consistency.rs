@@ -8,7 +8,7 @@ use runout_core::{
     numerics::{
         least_squares::{Basis, dot},
         number::significant,
-        statistics::f_tail,
+        statistics::{f_tail, median},
     },
 };
 
@@ -29,6 +29,12 @@ const LEAST_NOISE_UM: f64 = 1e-4;
 /// Ratio of the power in two ranges of orders from which a low-pass took noise away (a scanned surface falls by 7), and the fewest orders of each.
 const FLAT: f64 = 30.0;
 const FEWEST_ORDERS: f64 = 8.0;
+
+/// Orders to each side that an order above those of the harmonics is compared with, the chance by which it stands out, and the share of the deviations that
+/// it has at least.
+const AROUND: usize = 32;
+const ABSENT_CHANCE: f64 = 1e-6;
+const LEAST_ABSENT: f64 = 1e-3;
 
 /// What is declared of circles of these names: errors may depend on each other along the angle; circles are independent, have the same noise
 /// and may be offset.
@@ -85,12 +91,7 @@ pub(crate) fn hidden_noise(scan: &Scan, basis: &Basis) -> Option<String> {
     let middle = usize::midpoint(from, to);
     let power = |orders: Range<usize>| {
         let count = orders.len() as f64;
-        let of_order = |order: usize| {
-            let turned =
-                left.iter().zip(&scan.angle_rad).map(|(left, angle)| left * Complex64::cis(order as f64 * angle));
-            turned.sum::<Complex64>().norm_sqr()
-        };
-        (orders.map(of_order).sum::<f64>() / count, count)
+        (powers(&left, &scan.angle_rad, orders).iter().sum::<f64>() / count, count)
     };
     let ([lower, count], [upper, _]) = (power(from..middle).into(), power(middle..to).into());
     let ratio = (lower / upper).max(upper / lower);
@@ -102,6 +103,40 @@ pub(crate) fn hidden_noise(scan: &Scan, basis: &Basis) -> Option<String> {
         "what is left at orders {from} to {middle} has {} times the size of that at {middle} to {to}, where noise has the same",
         significant((lower / upper).sqrt(), 2)
     ))
+}
+
+/// Squares of the amplitudes of some orders of readings at these angles.
+fn powers(readings: &[f64], angles: &[f64], orders: Range<usize>) -> Vec<f64> {
+    let steps: Vec<Complex64> = angles.iter().map(|angle| Complex64::cis(*angle)).collect();
+    let mut waves: Vec<Complex64> = angles.iter().map(|angle| Complex64::cis(orders.start as f64 * angle)).collect();
+    let share = 2.0 / readings.len().max(1) as f64;
+    let of_order = |_: usize| {
+        let sum: Complex64 = waves.iter().zip(readings).map(|(wave, reading)| wave * reading).sum();
+        waves.iter_mut().zip(&steps).for_each(|(wave, step)| *wave *= step);
+        (share * sum).norm_sqr()
+    };
+    orders.map(of_order).collect()
+}
+
+/// The strongest order above those of a circle's harmonics that stands out from those about it, and its amplitude in µm: form that is in no value.
+pub(crate) fn absent(scan: &Scan, basis: &Basis) -> Option<(usize, f64)> {
+    let mut left = scan.deviation_um.clone();
+    basis.remove_from(&mut left);
+    let first = basis.rank() / 2 + 1;
+    let all = powers(&left, &scan.angle_rad, first..scan.len() / 2);
+    let (place, power) = all.iter().copied().enumerate().max_by(|one, other| one.1.total_cmp(&other.1))?;
+    let around: Vec<f64> = all
+        .iter()
+        .enumerate()
+        .filter(|(other, _)| (1..=AROUND).contains(&other.abs_diff(place)))
+        .map(|(_, one)| *one)
+        .collect();
+    // Powers of noise fall off as e^−x, of which the median is ln 2 of the mean.
+    let noise = median(around.iter().copied()) / std::f64::consts::LN_2;
+    let least_um = LEAST_ABSENT * rms(scan.deviation_um.iter().copied());
+    let stands_out = power > noise * ((all.len() as f64).ln() - ABSENT_CHANCE.ln());
+    (around.len() >= AROUND && stands_out && power.sqrt() > least_um.max(LEAST_NOISE_UM))
+        .then(|| (first + place, power.sqrt()))
 }
 
 /// Whether a circle of one turn ends where it began: lines through the points before and behind its beginning have to meet there as those at all
@@ -213,5 +248,19 @@ mod tests {
         let [nothing, falling] = [50, 250].map(behind_low_pass);
         assert!(nothing.contains("less than the noise of any instrument"), "{nothing}");
         assert!(falling.contains("times the size of that at"), "{falling}");
+    }
+
+    #[test]
+    fn a_line_above_the_harmonics_is_absent_form() {
+        let fitted = harmonics(60);
+        let said = (0..100).filter(|seed| absent(&circle(*seed, 720, 0.0), &fitted).is_some()).count();
+        assert_eq!(said, 0);
+        for (order, amplitude_um) in [(80, 0.3), (200, 0.05)] {
+            let mut scan = circle(1, 720, 0.0);
+            let wave = scan.angle_rad.iter().map(|angle| amplitude_um * (f64::from(order) * angle + 0.7).cos());
+            scan.deviation_um.iter_mut().zip(wave).for_each(|(height, wave)| *height += wave);
+            let (found, size_um) = absent(&scan, &fitted).unwrap_or_default();
+            assert!(found == order as usize && (size_um / amplitude_um - 1.0).abs() < 0.3, "{found} {size_um}");
+        }
     }
 }

@@ -209,25 +209,25 @@ impl LinearModel for LeastSquaresCylinder {
             1 => format!("each of {ARCS} arcs of the circle is held out once and predicted from the others"),
             count => format!("each of {count} circles is held out once and predicted from the others"),
         };
-        let mut remarks = vec![
+        let mut notes = vec![
             left_out,
             "form of the exports is that of the effects found (taper, barrel, lobes), not of each circle on its own"
                 .into(),
         ];
         if let Some(outlier_mad) = self.outlier_mad() {
-            remarks.push(format!(
+            notes.push(format!(
                 "outliers beyond {outlier_mad} MAD are left out before, circle by circle: {} of {} points",
                 basis.circles.iter().map(|circle| circle.measured - circle.scan.len()).sum::<usize>(),
                 basis.circles.iter().map(|circle| circle.measured).sum::<usize>()
             ));
         }
         if !basis.cylinder.tilted {
-            remarks.push("the circles are at one height: tilt, taper and barrel are not observable".into());
+            notes.push("the circles are at one height: tilt, taper and barrel are not observable".into());
         }
         let form = Form { sections, radius_mm: self.nominal_mm() + 1e-3 * offset_um };
         let mut evaluables = vec![Evaluable::ClosedProfiles(form)];
         evaluables.extend(open_profiles(points, &basis.cylinder)?.into_iter().map(Evaluable::OpenProfile));
-        Ok(Outcome { evaluables, remarks, ..Outcome::default() })
+        Ok(Outcome { evaluables, notes, ..Outcome::default() })
     }
 }
 

@@ -2,12 +2,12 @@
 
 mod circles;
 
-use std::f64::consts::PI;
+use std::f64::consts::{FRAC_1_SQRT_2, PI};
 
 use runout_core::{
     Complex64, Error, ErrorKind, Result,
     fault::Fault,
-    numerics::statistics::median,
+    numerics::{number::significant, statistics::median},
     pipeline::{Context, StageConfig},
     points::{
         PointColumn,
@@ -26,7 +26,7 @@ use circles::unseen;
 use crate::{
     circle::Harmonics,
     config::LeastSquaresCylinderConfig,
-    consistency::{closes, hidden_noise, unlike},
+    consistency::{absent, closes, hidden_noise, unlike},
     generatrix::open_profiles,
     predict::Prediction,
     robust::rms,
@@ -98,10 +98,17 @@ impl PointSeparator for LeastSquaresCylinder {
     }
 
     fn separate(&self, points: &Points) -> Result<Outcome> {
+        let circles = self.circles(points)?;
+        let cylinder = cylinder(points, &circles, self.0.radius_mm)?;
         let mut evaluables = vec![Evaluable::ClosedProfiles(self.form(points)?)];
-        let profiles = open_profiles(points, &self.cylinder(points)?)?;
-        evaluables.extend(profiles.into_iter().map(Evaluable::OpenProfile));
-        Ok(Outcome { evaluables, ..Outcome::default() })
+        evaluables.extend(open_profiles(points, &cylinder)?.into_iter().map(Evaluable::OpenProfile));
+        let mut notes = Self::describe(&circles, &cylinder);
+        notes.push(format!(
+            "form counts from it; the stated uncertainty is the scatter about orders 0 to {}: it does not include errors of the \
+             machine that vary more slowly along a circle",
+            self.0.max_order
+        ));
+        Ok(Outcome { evaluables, notes, ..Outcome::default() })
     }
 
     fn needs_surface(&self) -> bool {
@@ -109,18 +116,9 @@ impl PointSeparator for LeastSquaresCylinder {
     }
 
     fn remarks(&self, points: &Points, surface: Option<&Surface>) -> Result<Vec<String>> {
-        let circles = self.circles(points)?;
-        let cylinder = cylinder(points, &circles, self.0.radius_mm)?;
-        let mut remarks = Self::describe(&circles, &cylinder);
-        remarks.push(format!(
-            "form counts from it; the stated uncertainty is the scatter about orders 0 to {}: it does not include errors of the \
-             machine that vary more slowly along a circle",
-            self.0.max_order
-        ));
-        if let Some(surface) = surface {
-            remarks.extend(self.predictions(points, &cylinder, surface)?.iter().map(Prediction::to_string));
-        }
-        Ok(remarks)
+        let Some(surface) = surface else { return Ok(Vec::new()) };
+        let predictions = self.predictions(points, &self.cylinder(points)?, surface)?;
+        Ok(predictions.iter().map(Prediction::to_string).collect())
     }
 
     fn model(&self) -> Option<&dyn PointModel> {
@@ -201,7 +199,7 @@ impl LeastSquaresCylinder {
         let unfit = |problem: String| {
             Error::new("fit harmonics to", format!("{} of {}", circle.id, points.input.display()), problem)
                 .of(ErrorKind::InsufficientData)
-                .help("leave the trace out of `use`")
+                .help(remedy(std::iter::once(&circle.scan), "leave the trace out of `use`"))
         };
         let mut level_variance = [0.0; 2];
         let mut height_mm = 0.0;
@@ -233,12 +231,20 @@ impl LeastSquaresCylinder {
             variance.fill(f64::NAN);
             circle.warnings.push(format!("{named}: {reason}"));
         }
+        let mut section = circle.section(&placed, order, cylinder);
+        if let Some((above, size_um)) = absent(&placed, &basis) {
+            section.absent_um = FRAC_1_SQRT_2 * size_um;
+            let size_um = significant(size_um, 2);
+            let what =
+                format!("order {above} has {size_um} µm, above {order}, the highest (`max_order`): it is in no value");
+            circle.warnings.push(format!("{named}: {what}"));
+        }
         let mut observable = vec![true; estimate.len()];
         estimate.resize(orders, Complex64::new(f64::NAN, f64::NAN));
         variance.resize(orders, f64::NAN);
         observable.resize(orders, false);
         Ok(Separation {
-            sections: vec![circle.section(&placed, order, cylinder)],
+            sections: vec![section],
             unknowns: vec![Quantity::Form(0)],
             observable,
             estimate,
@@ -285,6 +291,9 @@ impl LeastSquaresCylinder {
     }
 }
 
+/// Angles that are all below, in degrees, are none of a circle.
+const NO_DEGREES: f64 = 7.0;
+
 fn count_of(circles: usize) -> String {
     if circles == 1 { "1 circle".into() } else { format!("{circles} circles") }
 }
@@ -296,8 +305,17 @@ fn cylinder(points: &Points, circles: &[Circle], nominal_mm: f64) -> Result<Cyli
         return Err(refuse("every trace that could be used is held out").help("shorten `hold_out`"));
     }
     let scans: Vec<Scan> = circles.iter().map(|circle| circle.scan.clone()).collect();
-    Cylinder::fit(&scans, nominal_mm, tilt_observable(circles))
-        .ok_or_else(|| refuse("its points do not determine radius and axis"))
+    Cylinder::fit(&scans, nominal_mm, tilt_observable(circles)).ok_or_else(|| {
+        let help = remedy(scans.iter(), "points all around the part determine them");
+        refuse("its points do not determine radius and axis").help(help)
+    })
+}
+
+/// What to do with points that determine nothing: angles of a few degrees only are those of another unit.
+fn remedy<'a>(mut scans: impl Iterator<Item = &'a Scan>, usual: &'static str) -> &'static str {
+    let is_far = |angle: &f64| angle.abs() > NO_DEGREES.to_radians();
+    let are_degrees = scans.any(|scan| scan.angle_rad.iter().any(is_far));
+    if are_degrees { usual } else { "are the angles in radians or turns? `angle_deg` is in degrees" }
 }
 
 /// Whether circles stand further apart than each wavers along z, or are turns of a helix: else the axis's slope is not

@@ -104,8 +104,8 @@ fn a_single_circle_far_off_centre_has_its_own_roundness() {
         println!("{off_um} µm off on R {radius_mm} mm: RONt {found:.6} ± {std:.1e}, truth {truth:.6}");
         // 0.2 nm: peaks between the angles of the evaluation.
         assert!((found - truth).abs() < 2e-4, "{found} instead of {truth}");
-        assert!(summary.warnings.iter().any(|warning| warning.contains("tilt of the axis is not observable")));
-        assert!(summary.warnings.iter().any(|warning| warning.contains("least-squares circle of 1 circle")));
+        assert!(summary.notes.iter().any(|note| note.contains("tilt of the axis is not observable")));
+        assert!(summary.notes.iter().any(|note| note.contains("least-squares circle of 1 circle")));
     }
 }
 

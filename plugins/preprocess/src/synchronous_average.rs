@@ -29,7 +29,7 @@ mod turns;
 mod window;
 
 use runout_core::{
-    Complex64, Error, ErrorKind, Result,
+    Error, ErrorKind, Result,
     fault::Fault,
     measurement::{Block, Capture, Response, SampleStream},
     near_tone::NearTone,
@@ -44,7 +44,7 @@ use serde::Deserialize;
 
 use kernel::{Kernel, PASS_BAND};
 use marks::{angle_std_rad, known_within, turn_angle_std_rad};
-use resample::Resampling;
+use resample::{CaptureAverage, Resampling};
 use turns::Turn;
 
 use self::angle_unit::AngleUnit;
@@ -153,7 +153,7 @@ impl SynchronousAverage {
         Ok(())
     }
 
-    fn warnings(&self, capture: &Capture, speed_rpm: Option<f64>, passed: Option<&[Complex64]>) -> Vec<String> {
+    fn warnings(&self, capture: &Capture, speed_rpm: Option<f64>, outcome: &CaptureAverage) -> Vec<String> {
         let mut warnings = Vec::new();
         if let (Some(measured), Some(stated)) = (speed_rpm, capture.stated_speed_rpm) {
             let tolerance_percent = self.config.speed_tolerance_percent;
@@ -179,6 +179,17 @@ impl SynchronousAverage {
                 angles
             ));
         }
+        warnings.extend(outcome.angle_scatter.and_then(|one| one.said(orders_held(turn) + 1, &capture.object)));
+        if outcome.absent_um > 0.0 {
+            warnings.push(format!(
+                "{}: orders above {}, the highest of `samples_per_rev` = {}, have {} µm rms: they are in no value",
+                capture.object,
+                self.max_order(),
+                self.config.samples_per_rev,
+                significant(outcome.absent_um, 2)
+            ));
+        }
+        let passed = outcome.passed.as_deref();
         if let Some(passed) = passed.and_then(|passed| passed[..passed::held(passed)].last()) {
             warnings.push(format!(
                 "{}: {turn:.0} samples a turn carry orders to {} through the resampling in angle; those above are divided by what passes, \
@@ -309,36 +320,14 @@ impl Averager for SynchronousAverage {
         count.rejected.sort_by_key(|turn| turn.turn);
         self.enough(&capture, &count, count.used)?;
 
-        let mut of_turns = None;
         if let Some(turn) = capture.median_turn_samples() {
-            // What the recording cannot hold is not found to be 0: it is not there.
-            let (mut orders, channels) = (orders_held(turn) + 1, capture.channels());
-            of_turns = outcome.angle_scatter.and_then(|scatter| scatter.said(orders, &capture.object));
-            let turned = outcome.angle_scatter.map(|scatter| scatter.passed(outcome.mean.len() / channels.max(1)));
-            let passed: Vec<Vec<Complex64>> = outcome.passed.iter().cloned().chain(turned).collect();
-            for passed in passed {
-                resample::undo(&mut outcome, &passed, channels);
-                orders = orders.min(passed::held(&passed));
-            }
-            if let (Some(scatter), Some(covariance)) = (outcome.angle_scatter, &mut outcome.covariance) {
-                scatter.add_to(covariance, &outcome.mean, channels);
-            }
-            outcome.mean.truncate(orders * channels);
-            for matrices in
-                [&mut outcome.covariance, &mut outcome.scatter, &mut outcome.scatter_beside].into_iter().flatten()
-            {
-                matrices.truncate(orders * channels * channels);
-            }
-            if let Some(split) = &mut outcome.split {
-                split::truncate(split, orders, channels);
-            }
+            resample::restore(&mut outcome, orders_held(turn) + 1, capture.channels());
         }
         let most_angles = capture.median_turn_samples().map_or(usize::MAX, most_angles);
         let mean_turn = outcome.used_samples / outcome.used as f64;
         let speed_rpm = capture.sample_rate_hz.map(|rate_hz| 60.0 * rate_hz / mean_turn);
-        let mut warnings = self.warnings(&capture, speed_rpm, outcome.passed.as_deref());
+        let mut warnings = self.warnings(&capture, speed_rpm, &outcome);
         warnings.extend(of_angle);
-        warnings.extend(of_turns);
         warnings.extend(near_synchronous(&outcome.near_tones, count.used, &capture.object));
         warnings.extend(outcome.bridged.map(|bridged| format!("{}: {bridged}", capture.object)));
         if let Some(speed_rpm) = speed_rpm {
@@ -369,6 +358,7 @@ impl Averager for SynchronousAverage {
             sample_rate_hz: capture.sample_rate_hz,
             responses: capture.responses,
             bridged_beyond_rad: outcome.bridged_beyond_rad,
+            absent_um: outcome.absent_um,
             warnings,
         };
         if profile.spread.is_some() {

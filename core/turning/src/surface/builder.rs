@@ -65,7 +65,8 @@ impl SurfaceBuilder {
             orders.truncate(fitting);
             let SectionAt { id, z_mm, gaps, used, .. } = at.clone();
             let (station, half_power_upr) = (result.station.clone(), result.half_power_upr());
-            self.sections.push(Section { id, station, z_mm, gaps, used, half_power_upr, orders, noise });
+            let absent_um = result.absent_um(index);
+            self.sections.push(Section { id, station, z_mm, gaps, used, half_power_upr, absent_um, orders, noise });
         }
     }
 

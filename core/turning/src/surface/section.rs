@@ -20,6 +20,8 @@ pub struct Section {
     pub used: f64,
     /// Order of which filters before the average pass half.
     pub half_power_upr: Option<f64>,
+    /// Form above the highest order, as far as it shows: root mean square in µm.
+    pub absent_um: f64,
     /// One entry an order from 0; `None` where it is lost.
     pub orders: Vec<Option<Order>>,
     /// What noise its errors are made of, as wide as their variance is badly known.

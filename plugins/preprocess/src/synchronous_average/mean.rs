@@ -21,6 +21,12 @@ use super::{
 /// Turns from which on the neighbours hold a tenth of the scatter or less: it is known well enough without them.
 const MANY_TURNS: usize = 40;
 
+/// The highest orders that are kept, whose noise is that of those above.
+const HIGHEST: usize = 5;
+/// So many times the power of noise, and this share of the amplitudes that are kept, what is above them has at least.
+const ABOVE_NOISE: f64 = 4.0;
+const LEAST_ABSENT: f64 = 1e-3;
+
 /// Sums over turns, taken from the first one, so that turns that are all alike have exactly no covariance.
 ///
 /// Sums are taken angle by angle: they are transformed, not every turn. Only what is not linear in the turns, their
@@ -69,19 +75,45 @@ impl Mean {
 
     /// Mean over the turns, `[order][channel]`.
     pub(super) fn mean(&self) -> Vec<Complex64> {
-        let Size { channels, angles, orders } = self.size;
+        let Size { channels, orders, .. } = self.size;
         let mut mean = vec![Complex64::ZERO; orders * channels];
         if self.turns == 0 {
             return mean;
         }
-        let scale = 1.0 / self.turns as f64;
-        let readings: Vec<f64> = self.pivot.iter().zip(&self.sum).map(|(pivot, sum)| pivot + sum * scale).collect();
-        let mut harmonics = vec![Complex64::ZERO; orders * channels];
-        Analysis::new(angles, orders).take_apart(&readings, &mut harmonics);
-        for (channel, harmonics) in harmonics.chunks_exact(orders).enumerate() {
+        for (channel, harmonics) in self.harmonics(orders).chunks_exact(orders).enumerate() {
             mean[channel..].iter_mut().step_by(channels).zip(harmonics).for_each(|(to, harmonic)| *to = *harmonic);
         }
         mean
+    }
+
+    /// Those of the mean to an order that its angles hold, `[channel][order]`.
+    fn harmonics(&self, orders: usize) -> Vec<Complex64> {
+        let scale = 1.0 / self.turns as f64;
+        let readings: Vec<f64> = self.pivot.iter().zip(&self.sum).map(|(pivot, sum)| pivot + sum * scale).collect();
+        let mut harmonics = vec![Complex64::ZERO; orders * self.size.channels];
+        Analysis::new(self.size.angles, orders).take_apart(&readings, &mut harmonics);
+        harmonics
+    }
+
+    /// What the mean has above the orders that are kept, to `held` of them, beyond the noise of the highest ones: root mean square in µm of the channel
+    /// that has most of it; 0 where noise explains it.
+    pub(super) fn absent_um(&self, covariance: Option<&[Complex64]>, held: usize) -> f64 {
+        let Size { channels, angles, orders } = self.size;
+        let held = held.min(angles / 2);
+        let Some(covariance) = covariance.filter(|_| held > orders && orders > HIGHEST && self.turns > 0) else {
+            return 0.0;
+        };
+        let harmonics = self.harmonics(held);
+        let of_channel = |(channel, harmonics): (usize, &[Complex64])| {
+            let matrices = covariance.chunks_exact(channels * channels).skip(orders - HIGHEST);
+            let noise = matrices.map(|matrix| matrix[channel * (channels + 1)].re).sum::<f64>() / HIGHEST as f64;
+            let power = |harmonics: &[Complex64]| harmonics.iter().map(Complex64::norm_sqr).sum::<f64>();
+            let (kept, above) = (power(&harmonics[2..orders]), power(&harmonics[orders..]));
+            let noise = noise * (held - orders) as f64;
+            let is_form = above > ABOVE_NOISE * noise && above - noise > LEAST_ABSENT * LEAST_ABSENT * kept;
+            if is_form { (0.5 * (above - noise)).sqrt() } else { 0.0 }
+        };
+        harmonics.chunks_exact(held).enumerate().map(of_channel).fold(0.0, f64::max)
     }
 
     /// Covariance of the mean, `[order][channel][channel]`, from its neighbours; `None` below two turns. See [`Slow`].

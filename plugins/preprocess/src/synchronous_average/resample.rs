@@ -24,7 +24,7 @@ use super::{
     outliers::{Outliers, PendingTurn, Verdict},
     passed::{self, Fractions},
     size::Size,
-    split::Means,
+    split::{self, Means},
     spread::Motion,
     turns::{ROUNDING, Turn},
     window::{CONTINUED, Window},
@@ -54,6 +54,8 @@ pub(super) struct CaptureAverage {
     pub bridged_beyond_rad: f64,
     /// What passes of each order where the interpolation weakens some that are kept.
     pub passed: Option<Vec<Complex64>>,
+    /// What is above the orders that are kept, beyond noise.
+    pub absent_um: f64,
     /// By how much turns are turned against each other, where that shows.
     pub angle_scatter: Option<AngleScatter>,
 }
@@ -171,11 +173,14 @@ impl<'a> Resampling<'a> {
         self.means.sum_up();
         let neighbours = self.means.whole.neighbours();
         let mean = self.means.whole.mean();
+        let covariance = self.means.whole.covariance(neighbours.as_ref());
+        let held = self.capture.median_turn_samples().map_or(0, |turn| orders_held(turn) + 1);
         CaptureAverage {
+            absent_um: self.means.whole.absent_um(covariance.as_deref(), held),
             turn_angles: self.angles,
             angle_scatter: self.means.whole.angle_scatter(&mean, !self.capture.encoder),
             mean,
-            covariance: self.means.whole.covariance(neighbours.as_ref()),
+            covariance,
             near_tones: neighbours.as_ref().map(near_tones).unwrap_or_default(),
             scatter: self.means.whole.scatter(),
             scatter_beside: self.means.scatter_beside(),
@@ -320,8 +325,29 @@ fn is_smooth(mut number: usize) -> bool {
     number == 1
 }
 
+/// Gives the orders, of so many that a turn holds, what did not pass of them, and leaves out those of which next to nothing did: they are not found to
+/// be 0, they are not there.
+pub(super) fn restore(outcome: &mut CaptureAverage, mut orders: usize, channels: usize) {
+    let turned = outcome.angle_scatter.map(|scatter| scatter.passed(outcome.mean.len() / channels.max(1)));
+    let passed: Vec<Vec<Complex64>> = outcome.passed.iter().cloned().chain(turned).collect();
+    for passed in passed {
+        undo(outcome, &passed, channels);
+        orders = orders.min(passed::held(&passed));
+    }
+    if let (Some(scatter), Some(covariance)) = (outcome.angle_scatter, &mut outcome.covariance) {
+        scatter.add_to(covariance, &outcome.mean, channels);
+    }
+    outcome.mean.truncate(orders * channels);
+    for matrices in [&mut outcome.covariance, &mut outcome.scatter, &mut outcome.scatter_beside].into_iter().flatten() {
+        matrices.truncate(orders * channels * channels);
+    }
+    if let Some(split) = &mut outcome.split {
+        split::truncate(split, orders, channels);
+    }
+}
+
 /// Gives an average, and everything about it order by order, what did not pass.
-pub(super) fn undo(outcome: &mut CaptureAverage, passed: &[Complex64], channels: usize) {
+fn undo(outcome: &mut CaptureAverage, passed: &[Complex64], channels: usize) {
     passed::harmonics(&mut outcome.mean, passed, channels);
     for matrices in [&mut outcome.covariance, &mut outcome.scatter, &mut outcome.scatter_beside].into_iter().flatten() {
         passed::squares(matrices, passed, channels);
