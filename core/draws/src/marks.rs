@@ -7,8 +7,8 @@ use runout_numerics::{
 
 use crate::spectrum::{Noise, Spectrum};
 
-/// Widths at which marks are sought: standard deviations of Gaussian curves, in degrees.
-const WIDTHS_DEG: [f64; 9] = [0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 11.0];
+/// Widths at which marks are sought: standard deviations of Gaussian curves, in degrees. The first ones are those of a point or two of many.
+const WIDTHS_DEG: [f64; 15] = [0.09, 0.12, 0.18, 0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 11.0];
 /// A curve is no narrower than this over the highest order: else one order is like the next.
 const NARROWEST: f64 = 1.5;
 /// Orders above this over a width have less than e⁻¹⁸ of its curve.
