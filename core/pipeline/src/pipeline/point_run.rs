@@ -109,8 +109,11 @@ fn check_declared(evaluables: &[Evaluable], declared: &[EvaluableKind]) -> Resul
     }
 }
 
-/// Heights above their least-squares plane, as meshes draw them.
+/// Heights as files and meshes have them: above their least-squares plane, where the domain has not removed form itself, or none as it was asked for.
 fn above_plane(plane: &PlaneMap) -> Result<HeightGrid> {
+    if plane.reference.is_some() {
+        return Ok(plane.grid.clone());
+    }
     let HeightGrid { columns, step_x_mm, step_y_mm, .. } = plane.grid;
     let map = HeightMap::new(&plane.grid.height_nm[..], columns, step_x_mm, step_y_mm, false)?;
     let height_nm = without_polynomial(&map, 1)?.heights_um().to_vec();

@@ -27,6 +27,9 @@ const USUAL_UM: [f64; 2] = [0.01, 2e4];
 const FEWEST_ROWS: usize = 6;
 /// A column that stays at one number for so many times as long as usual is stuck there.
 const STUCK: usize = 40;
+/// A number that stands so many times, so many ranges of the others beyond them, is a code.
+const CODES: usize = 2;
+const BEYOND: f64 = 20.0;
 /// From one unit of length to the next, and how much parts of one measurement differ in size besides.
 const BETWEEN_UNITS: f64 = 1e3;
 const USUAL_RATIO: f64 = 3.0;
@@ -86,7 +89,29 @@ pub fn checks(points: &Points, columns: &[PointColumn]) -> Vec<Check> {
         .iter()
         .filter(|(column, _)| moves(column.name))
         .find_map(|(column, values)| copied(column.name, values));
-    copies.into_iter().chain(equal_columns(&measured)).chain(unmeasured(&measured)).chain(stuck).collect()
+    let codes = measured.iter().filter_map(|(column, values)| code(column.name, values));
+    let codes: Vec<Check> = codes.collect();
+    copies.into_iter().chain(equal_columns(&measured)).chain(unmeasured(&measured)).chain(stuck).chain(codes).collect()
+}
+
+/// One number that stands several times at an end of a column, far beyond all others: a code for a missing value.
+fn code(name: &str, values: &[f64]) -> Option<Check> {
+    let ends = |values: &mut dyn Iterator<Item = f64>| {
+        values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], one| [low.min(one), high.max(one)])
+    };
+    let known = || values.iter().copied().filter(|one| one.is_finite());
+    let [low, high] = ends(&mut known());
+    [low, high].into_iter().find_map(|end| {
+        let is_end = |one: f64| one.total_cmp(&end).is_eq();
+        let rows = known().filter(|one| is_end(*one)).count();
+        let [low, high] = ends(&mut known().filter(|one| !is_end(*one)));
+        let apart = if end < low { low - end } else { end - high };
+        (rows >= CODES && high > low && apart > BEYOND * (high - low)).then(|| {
+            Check::new(Test::Measured, name, apart / (high - low), &[], 0.0).finding(|| {
+                format!("`{name}` is {end} in {rows} rows, and from {low} to {high} in all others: a code for a missing value is no reading, leave these rows out")
+            })
+        })
+    })
 }
 
 /// Columns whose numbers look as if they had another unit than their name says.
@@ -279,6 +304,8 @@ mod tests {
             Points { columns: vec![Column { name: "dx_mm".into(), values: vec![0.1, -1e300] }], ..Points::default() };
         let refused = refuse_impossible(&impossible).unwrap_err().to_string();
         assert!(refused.contains("`dx_mm` is -1e300 in row 2"), "{refused}");
+        let coded = findings(|row| if row % 60 == 3 { -9999.0 } else { reading(row) }, sound, 200);
+        assert!(coded.len() == 1 && coded[0].contains("`dx_mm` is -9999 in 4 rows"), "{coded:?}");
         // The same of a grid of which few places are taken.
         assert_eq!(findings(|row| ((row % 20) * 37 % 191) as f64 * 1e-3, sound, 40), [""; 0]);
         let stuck = findings(reading, |row| if row < 120 { sound(row) } else { sound(120) }, 200);
