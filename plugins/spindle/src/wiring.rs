@@ -63,6 +63,10 @@ pub(crate) fn suspects(
 ) -> Vec<Suspect> {
     let trial = Trial::new(layout, applied, readings, weights);
     let Some(declared) = trial.left(&[], f64::INFINITY) else { return Vec::new() };
+    // Noise leaves as much where little is redundant.
+    if weights.is_some() && declared <= SUSPICIOUS_CHI2 {
+        return Vec::new();
+    }
     let single = single_mistakes(layout);
     let mut found: Vec<Suspect> = Vec::new();
     let noise = if weights.is_some() { FAR_FROM_NOISE } else { SHARE_OF_TWO * declared };
