@@ -2,6 +2,7 @@
 
 use std::{
     fs,
+    io::{BufRead, BufReader, Read},
     path::{Path, PathBuf},
 };
 
@@ -46,7 +47,10 @@ pub(crate) fn execute(args: &NewArgs, json: bool, registry: &Registry) -> Result
     };
     let text = match &args.file {
         None => template.to_owned(),
-        Some(file) => with_load(template, &load(file, &folder, template, checked(template)?.rig.as_ref())?),
+        Some(file) => {
+            let load = load(file, &folder, template, checked(template)?.rig.as_ref())?;
+            with_object(&with_load(template, &load), file)
+        }
     };
     let pipeline = checked(&text)?;
     runout_core::atomic_file::write(&output, text.as_bytes())?;
@@ -96,6 +100,19 @@ fn load_of(template: &str) -> &str {
 
 fn with_load(template: &str, load: &str) -> String {
     template.replace(load_of(template), load)
+}
+
+/// Points as measured are those of circles, or of a profile, as their first line says, and no map whose form is taken off.
+fn with_object(text: &str, file: &Path) -> String {
+    let of_map = text.lines().find(|line| line.starts_with("form = \"plane\""));
+    let (Some(of_map), true) = (of_map, load_of(text).contains("plugin = \"points\"\npath")) else {
+        return text.to_owned();
+    };
+    let mut head = String::new();
+    let read = fs::File::open(file).map(|file| BufReader::new(file.take(4096)).read_line(&mut head));
+    let is_circle = read.is_err() || ["angle", "radius", "y_"].iter().any(|name| head.contains(name));
+    let object = if is_circle { "cylinder" } else { "profile" };
+    text.replace(of_map, &format!("object = \"{object}\"    # \"roundness\" of one circle, \"cylinder\", \"profile\""))
 }
 
 /// The table `[load]` of a file that the loader of this template, or one for the same kind of data, reads.

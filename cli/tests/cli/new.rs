@@ -89,6 +89,13 @@ fn maps_and_points_are_read_by_their_loaders() {
     assert_eq!(folder.run(&["run", "axial-reversal.toml"]).status, 0);
     let refused = folder.run(&["new", "fly-cutting", &name]);
     assert!(refused.status == 1 && refused.stderr.contains("no height map"), "{}", refused.stderr);
+    // Points as measured are those of circles, or of a profile.
+    for (head, object) in [("angle_deg,radius_mm", "cylinder"), ("x_mm,height_nm", "profile")] {
+        fs::write(folder.path().join("points.csv"), format!("{head}\n0,1\n1,2\n")).unwrap();
+        assert_eq!(folder.run(&["new", "as-measured", "points.csv", "--overwrite"]).status, 0);
+        let text = fs::read_to_string(folder.path().join("as-measured.toml")).unwrap();
+        assert!(text.contains(&format!("object = \"{object}\"")) && !text.contains("form ="), "{text}");
+    }
     let missing = folder.run(&["new", "axial-reversal", "there-is-none.csv", "--out", "x.toml"]);
     assert!(missing.status == 1 && missing.stderr.contains("no such file"), "{}", missing.stderr);
 }

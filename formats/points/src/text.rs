@@ -21,6 +21,12 @@ enum Separator {
 pub(crate) fn read(input: &InputFile, given: Option<&[String]>) -> Result<RawTable> {
     let shown = input.path().display().to_string();
     let mut file = BufReader::new(input.open()?);
+    let marks: [&[u8]; 2] = [&[0xFF, 0xFE], &[0xFE, 0xFF]];
+    if marks.iter().any(|mark| file.fill_buf().is_ok_and(|bytes| bytes.starts_with(mark))) {
+        return Err(Error::new("read", shown, "its text is UTF-16")
+            .of(ErrorKind::UnsuitableData)
+            .help("save it as UTF-8"));
+    }
     let Start { separator, words: first, comment, skipped } =
         Start::of(&mut file).map_err(|error| failed(&shown, error))?;
     let are_numbers = !first.is_empty() && first.iter().all(|word| is_number(word));
