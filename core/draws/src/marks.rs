@@ -7,8 +7,10 @@ use runout_numerics::{
 
 use crate::spectrum::{Noise, Spectrum};
 
-/// Widths at which marks are sought: standard deviations of Gaussian curves, in degrees. The first ones are those of a point or two of many.
-const WIDTHS_DEG: [f64; 15] = [0.09, 0.12, 0.18, 0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 11.0];
+/// Widths at which marks are sought: standard deviations of Gaussian curves, in degrees.
+pub(crate) const WIDTHS_DEG: [f64; 12] = [0.09, 0.18, 0.35, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 11.0];
+/// Those of which noise has some by chance, of a point or two of many, begin the list.
+pub(crate) const NARROW: usize = 3;
 /// A curve is no narrower than this over the highest order: else one order is like the next.
 const NARROWEST: f64 = 1.5;
 /// Orders above this over a width have less than e⁻¹⁸ of its curve.
@@ -44,24 +46,30 @@ pub(crate) struct Marks {
 }
 
 impl Marks {
-    /// Adds up to `most` marks that stand out of noise and waves by more than so many standard deviations.
-    pub(crate) fn find(&mut self, harmonics: &[Complex64], noise: Noise<'_>, threshold: f64, most: usize) {
+    /// Adds up to `most` marks of these widths that stand out of noise and waves by more than so many standard deviations.
+    pub(crate) fn find(
+        &mut self,
+        harmonics: &[Complex64],
+        noise: Noise<'_>,
+        widths_deg: &[f64],
+        (threshold, most): (f64, usize),
+    ) {
         let mut rest = self.without(harmonics);
         let count = harmonics.len();
-        let curves: Vec<Vec<f64>> = (WIDTHS_DEG.into_iter().map(f64::to_radians))
+        let mut curves: Vec<(Vec<f64>, Fourier)> = (widths_deg.iter().map(|width| width.to_radians()))
             .filter(|width| width * count as f64 > NARROWEST)
             .map(|width| {
                 let orders = count.min((VANISHES / width) as usize + 1);
-                (0..orders).map(|order| (-0.5 * (width * order as f64).powi(2)).exp()).collect()
+                let curve = (0..orders).map(|order| (-0.5 * (width * order as f64).powi(2)).exp()).collect();
+                (curve, Fourier::new(quick_length(ANGLES_A_WAVE * orders).max(8)))
             })
             .collect();
-        let highest = curves.iter().map(Vec::len).max().unwrap_or(0);
-        let mut fourier = Fourier::new(quick_length(ANGLES_A_WAVE * highest).max(8));
         for _ in 0..most {
             let weights: Vec<f64> =
                 Spectrum::of(&rest, noise).background().iter().map(|of| of.map_or(0.0, f64::recip)).collect();
             let mut best = (threshold, None);
-            for curve in &curves {
+            for (curve, fourier) in &mut curves {
+                let curve: &[f64] = curve;
                 let seen: f64 = curve.iter().zip(&weights).map(|(curve, weight)| curve * curve * weight).sum();
                 if seen <= 0.0 {
                     continue;
@@ -74,11 +82,11 @@ impl Marks {
                         if value.abs() > best.1 { (angle, value.abs()) } else { best }
                     });
                 if largest * scale > best.0 {
+                    let angle = std::f64::consts::TAU * angle as f64 / fourier.length() as f64;
                     best = (largest * scale, Some((curve, angle, seen)));
                 }
             }
             let Some((curve, angle, seen)) = best.1 else { break };
-            let angle = std::f64::consts::TAU * angle as f64 / fourier.length() as f64;
             let shape = |order: usize| {
                 let height = if weights[order] > 0.0 { curve[order] } else { 0.0 };
                 Complex64::from_polar(height, -(order as f64) * angle)

@@ -5,7 +5,7 @@ use std::ops::Range;
 use runout_numerics::Complex64;
 
 use crate::{
-    marks::Marks,
+    marks::{Marks, NARROW, WIDTHS_DEG},
     spectrum::{Noise, Power, Spectrum},
 };
 
@@ -72,9 +72,9 @@ impl Section {
             return Self::of_any_noise(harmonics);
         }
         let mut marks = Marks::default();
-        marks.find(harmonics, noise, certain, CERTAIN.1);
+        marks.find(harmonics, noise, &WIDTHS_DEG, (certain, CERTAIN.1));
         let mut with_possible = marks.clone();
-        with_possible.find(harmonics, noise, POSSIBLE.0, POSSIBLE.1);
+        with_possible.find(harmonics, noise, &WIDTHS_DEG[NARROW..], POSSIBLE);
         let all: f64 = (0..harmonics.len()).filter_map(|order| noise.of(order)).sum();
         let is_large = |order: usize| noise.of(order).is_some_and(|variance| variance > LARGE * all);
         let whole_where_large = |shares: Vec<f64>| -> Vec<f64> {
