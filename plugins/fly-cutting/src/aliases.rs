@@ -7,8 +7,8 @@ use runout_core::closed_loop::{Closed, Fit, Model, Setting, fit::refit};
 
 use crate::{
     effects::{MISSING, SPINDLE_LINE},
+    lines::OtherRatio,
     model::{CutFit, CutModel},
-    passes::Line,
 };
 
 /// Ratios whose refits differ by less than this in χ² cannot be separated.
@@ -37,33 +37,6 @@ fn is_line(setting: &Setting) -> bool {
     MISSING.get(setting.effect).is_some_and(|missing| missing.line().is_some())
 }
 
-/// The same settings with a line at another ratio.
-pub(crate) struct OtherRatio {
-    ratio: f64,
-    /// By how much χ² promises to be worse.
-    worse: f64,
-    pub settings: Vec<Setting>,
-}
-
-/// Settings with each other ratio of the line at a place, the one that promises most first; nothing where there is no line.
-pub(crate) fn other_ratios(fit: &CutFit, settings: &[Setting], place: usize, highest: usize) -> Vec<OtherRatio> {
-    let Setting { effect, values } = &settings[place];
-    let (Some(tilts), &[ratio, amplitude, phase_deg]) =
-        (MISSING.get(*effect).and_then(|missing| missing.line()), &values[..])
-    else {
-        return Vec::new();
-    };
-    let line = Line { ratio, amplitude, phase: phase_deg.to_radians(), tilts };
-    let (promised, own) = fit.promising(line, highest);
-    let others = promised.into_iter().filter(|(other, ..)| (other - own).abs() >= 1e-3);
-    let with = |(ratio, amplitude, phase, worse): (f64, f64, f64, f64)| {
-        let mut settings = settings.to_vec();
-        settings[place].values = vec![ratio, amplitude, phase.to_degrees()];
-        OtherRatio { ratio, worse, settings }
-    };
-    others.map(with).collect()
-}
-
 fn of_line(model: &CutModel, closed: &mut Closed<CutFit>, known: usize, place: usize, highest: usize) -> Aliases {
     let Setting { effect, values } = closed.settings[place].clone();
     let mut aliases = Aliases { effect, ratios: Vec::new() };
@@ -72,7 +45,7 @@ fn of_line(model: &CutModel, closed: &mut Closed<CutFit>, known: usize, place: u
     let level = remainder.chi2_per_dof();
     let unit = if remainder.noise_is_known() { level.max(1.0) } else { level };
     let (mut refits, mut found, mut alike) = ([0, 0], Vec::new(), Vec::new());
-    for OtherRatio { ratio, worse, settings } in other_ratios(&closed.after, &closed.settings, place, highest) {
+    for OtherRatio { ratio, worse, settings } in closed.after.other_ratios(&closed.settings, place, highest) {
         let kind = usize::from(worse > REFITTED_CHI2 * unit);
         if refits[kind] >= MOST_REFITS[kind] {
             if worse < SAME_CHI2 * unit {

@@ -2,9 +2,10 @@
 
 use std::f64::consts::TAU;
 
-use runout_core::numerics::least_squares::dot;
+use runout_core::{closed_loop::Setting, numerics::least_squares::dot};
 
 use crate::{
+    effects::MISSING,
     model::CutFit,
     passes::{Cut, Line},
     phase,
@@ -23,6 +24,14 @@ const HARMONICS: usize = 3;
 const LINEAR: f64 = 0.2;
 /// Lines of which the phase of the scallops is fitted anew.
 const PHASED: usize = 12;
+
+/// The same settings with a line at another ratio.
+pub(crate) struct OtherRatio {
+    pub ratio: f64,
+    /// By how much χ² promises to be worse.
+    pub worse: f64,
+    pub settings: Vec<Setting>,
+}
 
 impl CutFit {
     /// Whether a line may earn its place, by what its spectrum shows: a refit beside it may gain for other reasons.
@@ -124,5 +133,24 @@ impl CutFit {
             all.iter().map(|(ratio, size)| (*ratio, size.norm(), size.arg(), worse(size.norm_sqr()))).collect();
         promised.sort_by(|one, other| one.3.total_cmp(&other.3));
         (promised, own_ratio)
+    }
+
+    /// Settings with each other ratio of the line at a place, the one that promises most first; nothing where there is no line.
+    pub(crate) fn other_ratios(&self, settings: &[Setting], place: usize, highest: usize) -> Vec<OtherRatio> {
+        let Setting { effect, values } = &settings[place];
+        let (Some(tilts), &[ratio, amplitude, phase_deg]) =
+            (MISSING.get(*effect).and_then(|missing| missing.line()), &values[..])
+        else {
+            return Vec::new();
+        };
+        let line = Line { ratio, amplitude, phase: phase_deg.to_radians(), tilts };
+        let (promised, own) = self.promising(line, highest);
+        let others = promised.into_iter().filter(|(other, ..)| (other - own).abs() >= 1e-3);
+        let with = |(ratio, amplitude, phase, worse): (f64, f64, f64, f64)| {
+            let mut settings = settings.to_vec();
+            settings[place].values = vec![ratio, amplitude, phase.to_degrees()];
+            OtherRatio { ratio, worse, settings }
+        };
+        others.map(with).collect()
     }
 }

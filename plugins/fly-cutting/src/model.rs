@@ -17,7 +17,6 @@ use runout_core::{
 };
 
 use crate::{
-    aliases::other_ratios,
     cells::Cells,
     config::FlyCuttingConfig,
     effects::{MISSING, Missing, applied, tidy},
@@ -199,7 +198,7 @@ impl Model for CutModel {
 
     fn elsewhere(&self, fit: &CutFit, applied: &[Setting], known: usize) -> Vec<Vec<Setting>> {
         let highest = self.data.config.max_frequency_ratio;
-        let of_line = |place: usize| other_ratios(fit, applied, place, highest).into_iter().take(ELSEWHERE);
+        let of_line = |place: usize| fit.other_ratios(applied, place, highest).into_iter().take(ELSEWHERE);
         // Shifts of the rows are searched anew beside what else was found.
         let of_shift = |place: usize| {
             let effect = applied[place].effect;
