@@ -200,7 +200,8 @@ fn sizes(separation: &Separation, unknown: usize, truth_um: &[f64], rows: &mut V
     let squares = (0..variance.len()).map(|order| separation.degrees_of_freedom(order)).collect();
     // Any seed that is another one for another form.
     let seed = harmonics.last().map_or(0, |value| value.re.to_bits());
-    let Some(draws) = Draws::of_section(&Measured { harmonics, variance, squares, lowest: 2 }, seed) else { return };
+    let measured = Measured { harmonics, variance, squares, variance_from: separation.variance_from, lowest: 2 };
+    let Some(draws) = Draws::of_section(&measured, seed) else { return };
     let values = |profile: &[f64], found: &mut Vec<f64>| found.extend([ront_lsci_um(profile), ra_um(profile)]);
     let mut truths = Vec::new();
     values(truth_um, &mut truths);

@@ -155,6 +155,28 @@ impl Errors {
         some.then_some(Self { sources })
     }
 
+    /// The same, of which the next so many draws have the power at each order that all have on average: else the standard deviation of so few would be
+    /// off by 1/√(2·draws).
+    #[must_use]
+    pub(crate) fn balanced(mut self, draws: usize) -> Self {
+        for Source { draws: numbers, amplitudes } in &mut self.sources {
+            let mut power = vec![0.0; amplitudes.len()];
+            let mut ahead = *numbers;
+            for _ in 0..draws {
+                let mut done = 0;
+                for stretch in ahead.next(amplitudes.len()) {
+                    let places = power[done..].iter_mut().zip(stretch);
+                    places.for_each(|(sum, number)| *sum += number.norm_sqr());
+                    done += stretch.len();
+                }
+            }
+            // Real and imaginary part have a variance of 1 each.
+            let share = |power: f64| if power > 0.0 { (2.0 * draws as f64 / power).sqrt() } else { 1.0 };
+            amplitudes.iter_mut().zip(power).for_each(|(amplitude, power)| *amplitude *= share(power));
+        }
+        self
+    }
+
     /// The standard deviation of an error at any one angle.
     #[must_use]
     pub fn std_um(&self) -> f64 {

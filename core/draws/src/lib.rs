@@ -26,5 +26,5 @@ pub use errors::{DrawnErrors, Errors};
 pub use interval::Interval;
 pub use open::OpenErrors;
 pub use profiles::{Draws, KINDS, Profiles, Source};
-pub use section::Measured;
+pub use section::{Measured, VarianceFrom};
 pub use uncertainty::*;

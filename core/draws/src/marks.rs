@@ -55,7 +55,7 @@ impl Marks {
         (threshold, most): (f64, usize),
     ) {
         let mut rest = self.without(harmonics);
-        let count = harmonics.len();
+        let count = harmonics.len().min(noise.reach());
         let mut curves: Vec<(Vec<f64>, Fourier)> = (widths_deg.iter().map(|width| width.to_radians()))
             .filter(|width| width * count as f64 > NARROWEST)
             .map(|width| {
@@ -126,5 +126,54 @@ impl Marks {
     pub(crate) fn without(&self, harmonics: &[Complex64]) -> Vec<Complex64> {
         let marks = self.sum(&self.heights(harmonics), harmonics.len());
         harmonics.iter().zip(marks).map(|(all, mark)| all - mark).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    use super::*;
+    use crate::section::VarianceFrom;
+
+    const ORDERS: usize = 1200;
+    /// Orders that a low-pass leaves, and what it leaves of those above.
+    const PASSED: usize = 600;
+    const LEFT: f64 = 1e-3;
+
+    /// How many of 40 profiles of noise behind a low-pass have a mark: alone, and with a scratch of so many standard deviations of the noise over the angle.
+    fn with_marks(scratch: f64) -> usize {
+        let mut random = ChaCha8Rng::seed_from_u64(5);
+        let passed = |order: usize| if order < PASSED { 1.0 } else { LEFT };
+        let variance: Vec<f64> = (0..ORDERS).map(|order| passed(order).powi(2)).collect();
+        let squares = vec![0; ORDERS];
+        let noise =
+            Noise { variance: &variance, squares: &squares, variance_from: VarianceFrom::OrdersBeside, lowest: 2 };
+        let width = 0.18_f64.to_radians();
+        let sum: f64 = (0..PASSED).map(|order| (-0.5 * (width * order as f64).powi(2)).exp()).sum();
+        let height = scratch * (0.5 * PASSED as f64).sqrt() / sum;
+        let mut one = |_: &usize| {
+            let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
+            let of_order = |order: usize| {
+                let white = Complex64::new(normal(), normal()) * std::f64::consts::FRAC_1_SQRT_2;
+                // What is left above the low-pass is more than its noise, and has one phase: rounding has such orders.
+                let left = if order < PASSED { Complex64::ZERO } else { Complex64::from(0.3) };
+                let scratch = height * (-0.5 * (width * order as f64).powi(2)).exp();
+                passed(order) * (white + left + Complex64::from_polar(scratch, -(order as f64)))
+            };
+            let harmonics: Vec<Complex64> = (0..ORDERS).map(of_order).collect();
+            let mut marks = Marks::default();
+            marks.find(&harmonics, noise, &WIDTHS_DEG, (5.0, 1));
+            !marks.all.is_empty()
+        };
+        (0..40).filter(|profile| one(profile)).count()
+    }
+
+    #[test]
+    fn what_a_low_pass_leaves_is_no_mark() {
+        assert!(with_marks(0.0) <= 1, "{}", with_marks(0.0));
+        assert!(with_marks(8.0) >= 39, "{}", with_marks(8.0));
     }
 }

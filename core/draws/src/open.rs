@@ -19,7 +19,7 @@ use runout_numerics::{
 use crate::{
     interval::{Interval, Sides},
     profiles::wider,
-    section::{Measured, Section},
+    section::{Measured, Section, VarianceFrom},
 };
 
 /// Draws of each form, and the fewest of a long profile: all of them together look at about so many points.
@@ -79,7 +79,10 @@ impl OpenErrors {
             return None;
         }
         let squares = vec![errors.squares; variance.len()];
-        let section = Section::of(&Measured { harmonics, variance, squares, lowest: 1 }, false);
+        let section = Section::of(
+            &Measured { harmonics, variance, squares, variance_from: VarianceFrom::Readings, lowest: 1 },
+            false,
+        );
         let mut found = Vec::new();
         look(profile_um, &mut found);
         let mut sides: Vec<[Sides; 2]> = found.iter().map(|_| [Sides::default(), Sides::default()]).collect();
@@ -258,7 +261,7 @@ impl<'a> ErrorDraws<'a> {
 
     /// Errors of two draws, of which the standard deviations are off alike.
     fn next(&mut self) -> [Vec<f64>; 2] {
-        let factor = wider(self.squares, self.chance.as_ref(), &mut self.random);
+        let factor = wider(self.squares, self.chance.as_ref(), VarianceFrom::Readings, &mut self.random);
         [(); 2].map(|()| {
             let mut errors_um = self.numbers();
             errors_um.iter_mut().zip(&self.std_um).for_each(|(error, std)| *error *= factor * std);

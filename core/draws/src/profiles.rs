@@ -10,7 +10,7 @@ use runout_numerics::{Complex64, fourier::Fourier};
 use crate::{
     errors::{DrawnErrors, Errors, largest},
     interval::{Interval, Sides},
-    section::{Form, Measured, Section, known_together},
+    section::{Form, Measured, Section, VarianceFrom, known_together},
 };
 
 /// Transforms of each form, of [`TURNS`] draws each: with 100 draws the ends of an interval are the second from each end.
@@ -19,6 +19,11 @@ const TRANSFORMS: usize = 25;
 const FEWEST_TRANSFORMS: usize = 6;
 /// Noise has no place: turned by a part of a turn, it is noise again.
 const TURNS: usize = 4;
+/// Draws of which the middle one is taken, and a number that has no divisor in common with [`TRANSFORMS`].
+const OF_EACH: usize = 16;
+const STRIDE: usize = 7;
+/// Part of a turn between draws of one transform.
+const GOLDEN: f64 = 0.618_033_988_749_894_9;
 /// Orders of which less than this share passes are left out of draws.
 const NEGLIGIBLE: f64 = 1e-6;
 /// Squares below which draws of a variance take no more than of this many: its mean would not exist.
@@ -75,19 +80,20 @@ impl Draws {
         }
         let sections = measured.iter().map(|section| Section::of(section, measured.len() > 1)).collect();
         let longest = measured.iter().map(|section| &section.squares).max_by_key(|squares| squares.len());
-        let together = known_together(longest.map_or(&[][..], Vec::as_slice));
+        let variance_from = measured.first().map(|section| section.variance_from).unwrap_or_default();
+        let together = known_together(longest.map_or(&[][..], Vec::as_slice), variance_from.together());
         let chances: Vec<Option<ChiSquared<f64>>> =
             together.iter().map(|(_, squares)| ChiSquared::new(*squares as f64).ok()).collect();
         let wider = [0, 1].map(|form| {
             let mut random = ChaCha8Rng::seed_from_u64(seed.wrapping_add(form));
             let mut of_all = || {
-                together
-                    .iter()
-                    .zip(&chances)
-                    .map(|((_, squares), of)| wider(*squares, of.as_ref(), &mut random))
-                    .collect()
+                let groups = together.iter().zip(&chances);
+                groups.map(|((_, squares), of)| wider(*squares, of.as_ref(), variance_from, &mut random)).collect()
             };
-            (0..TRANSFORMS).map(|_| of_all()).collect()
+            match variance_from {
+                VarianceFrom::OrdersBeside => (0..TRANSFORMS).map(|_| of_all()).collect(),
+                VarianceFrom::Readings => evenly(of_all),
+            }
         });
         let together = together.into_iter().map(|(orders, _)| orders).collect();
         Some(Self { sections, sources, together, wider, lowest, transforms: TRANSFORMS })
@@ -135,7 +141,8 @@ impl Draws {
     fn errors(&self, sources: &[Source], form: usize) -> Option<[Errors; 2]> {
         let of = |number: u64| {
             let another = |seed: u64| crate::errors::another(seed, 2 * form as u64 + number);
-            Errors::of_sources(sources.iter().map(|(seed, of)| (another(*seed), of.clone())), self.lowest)
+            let errors = Errors::of_sources(sources.iter().map(|(seed, of)| (another(*seed), of.clone())), self.lowest);
+            errors.map(|errors| errors.balanced(self.transforms))
         };
         Some([of(0)?, of(1)?])
     }
@@ -152,13 +159,31 @@ impl Draws {
     }
 }
 
+/// So many draws of what has one factor at most, evenly from many: the first few of them are spread as all are.
+fn evenly(mut draw: impl FnMut() -> Vec<f64>) -> Vec<Vec<f64>> {
+    let mut many: Vec<Vec<f64>> = (0..TRANSFORMS * OF_EACH).map(|_| draw()).collect();
+    many.sort_by(|one, other| one.partial_cmp(other).unwrap_or(std::cmp::Ordering::Equal));
+    (0..TRANSFORMS).map(|transform| many[transform * STRIDE % TRANSFORMS * OF_EACH + OF_EACH / 2].clone()).collect()
+}
+
 /// A factor on noise, as wide as its variance is badly known from so many squares: one chance for all orders and sections that share it.
-pub(crate) fn wider(squares: usize, chance: Option<&ChiSquared<f64>>, random: &mut ChaCha8Rng) -> f64 {
+pub(crate) fn wider(
+    squares: usize,
+    chance: Option<&ChiSquared<f64>>,
+    variance_from: VarianceFrom,
+    random: &mut ChaCha8Rng,
+) -> f64 {
     let Some(chance) = chance else { return 1.0 };
     let squares = squares as f64;
-    // Weights by 1/variance² favour orders whose variance was found too small by as much again.
-    let few = squares.max(FEWEST_SQUARES);
-    (squares / chance.sample(random)).sqrt() * (few - 2.0) / (few - 4.0)
+    let factor = (squares / chance.sample(random)).sqrt();
+    match variance_from {
+        // Weights by 1/variance² favour orders whose variance was found too small by as much again.
+        VarianceFrom::OrdersBeside => {
+            let few = squares.max(FEWEST_SQUARES);
+            factor * (few - 2.0) / (few - 4.0)
+        }
+        VarianceFrom::Readings => factor,
+    }
 }
 
 /// A profile of weighted orders on the angles of a transform.
@@ -250,8 +275,8 @@ impl Profiles<'_> {
                 self.noise(section, &section.forms[form], errors, &wider, &mut fourier, drawn);
             }
             for turn in 0..TURNS {
-                // Other angles in each transform, so that no place is always the same.
-                let from = (turn * angles + transform * angles / draws.transforms) / TURNS % angles;
+                // By the golden section, so that neither places nor phases of low orders come again.
+                let from = ((GOLDEN * (TURNS * transform + turn) as f64).fract() * angles as f64) as usize;
                 for ((drawn, section), (marks_um, sum)) in
                     drawn.iter().zip(sections).zip(marks_um.iter().zip(&mut with_marks))
                 {

@@ -25,8 +25,28 @@ const SHOWN: f64 = 9.0;
 const SHOWN_MOST: f64 = 3.0;
 /// The error of an order that has more than this share of all noise does not average out: it is left as it is.
 const LARGE: f64 = 0.2;
-/// Orders that share one estimate of their variance, at most.
+/// Orders that share one estimate of their variance, where it is that of orders beside each other.
 const TOGETHER: usize = 5;
+
+/// What the variances of orders were estimated from.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum VarianceFrom {
+    /// Each from itself and a few orders beside it.
+    #[default]
+    OrdersBeside,
+    /// All from one variance of readings: they are wrong together.
+    Readings,
+}
+
+impl VarianceFrom {
+    /// Orders that share an estimate, at most.
+    pub(crate) fn together(self) -> usize {
+        match self {
+            Self::OrdersBeside => TOGETHER,
+            Self::Readings => usize::MAX,
+        }
+    }
+}
 
 /// The harmonics of a section, and what is known of their errors, by order from 0.
 #[derive(Debug, Clone)]
@@ -37,6 +57,8 @@ pub struct Measured {
     pub variance: Vec<f64>,
     /// Squares from which each variance is known; 0: exactly.
     pub squares: Vec<usize>,
+    /// Which orders share them.
+    pub variance_from: VarianceFrom,
     /// Orders below have no errors.
     pub lowest: usize,
 }
@@ -65,8 +87,8 @@ pub(crate) struct Section {
 impl Section {
     /// One section alone, or one of those of a wall.
     pub(crate) fn of(measured: &Measured, of_wall: bool) -> Self {
-        let Measured { harmonics, variance, squares, lowest } = measured;
-        let noise = Noise { variance, squares, lowest: *lowest };
+        let Measured { harmonics, variance, squares, variance_from, lowest } = measured;
+        let noise = Noise { variance, squares, variance_from: *variance_from, lowest: *lowest };
         let (certain, seen) = if of_wall { (CERTAIN_OF_WALL, SEEN_OF_WALL) } else { (CERTAIN.0, SEEN) };
         if noise.is_refuted_by(harmonics, seen) {
             return Self::of_any_noise(harmonics);
@@ -116,11 +138,11 @@ impl Section {
 }
 
 /// Ranges of orders whose variances are known together, each with the squares that they are known from.
-pub(crate) fn known_together(squares: &[usize]) -> Vec<(Range<usize>, usize)> {
+pub(crate) fn known_together(squares: &[usize], most: usize) -> Vec<(Range<usize>, usize)> {
     let mut groups: Vec<(Range<usize>, usize)> = Vec::new();
     for (order, squares) in squares.iter().enumerate() {
         match groups.last_mut() {
-            Some((orders, known)) if known == squares && (*squares == 0 || orders.len() < TOGETHER) => orders.end += 1,
+            Some((orders, known)) if known == squares && (*squares == 0 || orders.len() < most) => orders.end += 1,
             _ => groups.push((order..order + 1, *squares)),
         }
     }

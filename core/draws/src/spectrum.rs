@@ -4,6 +4,8 @@ use std::ops::Range;
 
 use runout_numerics::Complex64;
 
+use crate::section::VarianceFrom;
+
 /// Orders beside an order from which the power of waves is taken, to each side: a third of it, this at least.
 const FEWEST_BESIDE: usize = 4;
 /// A line is an order of more power than waves and noise have together, by a chance of e⁻⁹.
@@ -12,8 +14,6 @@ pub(crate) const LINE: f64 = 9.0;
 const LOOKS: usize = 2;
 /// Squares that a variance is taken to be known from at least where its chance is weighed: a mean of x⁻¹ of fewer hardly exists.
 const FEWEST_SQUARES: f64 = 8.0;
-/// Orders that share a variance: the squares of one are worth those of so many fewer.
-const SHARING: f64 = 5.0;
 /// No ratio of power to variance stands out less than by chance beyond this, however few squares the variance is known from.
 const LARGEST_RATIO: f64 = 400.0;
 
@@ -60,6 +60,9 @@ impl Sums {
     }
 }
 
+/// Share of the noise that the orders above a low-pass have together, at most.
+const BEYOND: f64 = 1e-3;
+
 /// What the noise of each order is known to be, by order from 0.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Noise<'a> {
@@ -67,6 +70,8 @@ pub(crate) struct Noise<'a> {
     pub variance: &'a [f64],
     /// Squares that it is known from; 0: exactly.
     pub squares: &'a [usize],
+    /// Which orders share these squares.
+    pub variance_from: VarianceFrom,
     /// Orders below are exact.
     pub lowest: usize,
 }
@@ -80,27 +85,54 @@ impl Noise<'_> {
             .filter(|variance| order >= self.lowest && *variance > 0.0 && variance.is_finite())
     }
 
+    /// Orders from 0 on that hold all but [`BEYOND`] of the noise: above them a low-pass left next to nothing, neither of noise nor of marks.
+    pub(crate) fn reach(&self) -> usize {
+        let variance = |order: usize| self.of(order).unwrap_or(0.0);
+        let mut beyond = BEYOND * (0..self.variance.len()).map(variance).sum::<f64>();
+        let is_beyond = |order: &usize| {
+            beyond -= variance(*order);
+            beyond >= 0.0
+        };
+        self.variance.len() - (0..self.variance.len()).rev().take_while(is_beyond).count()
+    }
+
     pub(crate) fn squares(&self, order: usize) -> usize {
         self.squares.get(order).copied().unwrap_or(0)
     }
 
-    /// By how much the mean of 1/x of a mean of squares x exceeds 1: orders of which the variance was found too small weigh more.
+    /// By how much the mean of 1/x of a mean of squares x exceeds 1: orders of which the variance was found too small weigh more than others.
     fn few(&self, order: usize) -> f64 {
         let squares = (self.squares(order) as f64).max(FEWEST_SQUARES);
-        if self.squares(order) == 0 { 1.0 } else { squares / (squares - 4.0) }
+        let is_one_for_all = self.squares(order) == 0 || self.variance_from == VarianceFrom::Readings;
+        if is_one_for_all { 1.0 } else { squares / (squares - 4.0) }
     }
 
-    /// By how much the variance of a sum over orders that share a variance exceeds that of independent ones.
-    fn shared(&self, order: usize) -> f64 {
-        if self.squares(order) == 0 { 1.0 } else { 1.0 + 2.0 * SHARING / self.squares(order) as f64 }
+    /// Variance of a sum over orders from the sums of what each adds to its standard deviation, of its square, and of its square over the squares that
+    /// it is known from: what shares a variance is off together.
+    fn of_sum(&self, [linear, own, over_squares]: [f64; 3]) -> f64 {
+        // So many equal terms have these sums.
+        let terms = if own > 0.0 { linear * linear / own } else { 0.0 };
+        let together = match self.variance_from {
+            VarianceFrom::OrdersBeside => self.variance_from.together() as f64,
+            VarianceFrom::Readings => terms,
+        };
+        own + 2.0 * together * over_squares
+    }
+
+    /// 1 over the squares that an order is known from; 0 where it is known exactly.
+    fn over_squares(&self, order: usize) -> f64 {
+        if self.squares(order) == 0 { 0.0 } else { (self.squares(order) as f64).recip() }
     }
 
     /// Whether a profile has less power in all orders together than its noise alone would have beyond this quantile: then its variance is stated
     /// too large.
     pub(crate) fn is_refuted_by(&self, harmonics: &[Complex64], quantile: f64) -> bool {
         let known = || (0..harmonics.len()).filter_map(|order| Some((order, self.of(order)?)));
-        let all: f64 = known().map(|(_, variance)| variance).sum();
-        let spread: f64 = known().map(|(order, variance)| variance * variance * self.shared(order)).sum();
+        let [all, own, over_squares] = known().fold([0.0; 3], |[all, own, over], (order, variance)| {
+            let square = variance * variance;
+            [all + variance, own + square, over + square * self.over_squares(order)]
+        });
+        let spread = self.of_sum([all, own, over_squares]);
         let power: f64 = known().map(|(order, _)| harmonics[order].norm_sqr()).sum();
         power < all * of_mean_square(all * all / spread, -quantile)
     }
@@ -166,9 +198,12 @@ impl<'a> Spectrum<'a> {
         let raw = |order: usize| (total[order] - of_noise[order]).max(0.0);
         // Squares that a weighted mean is worth: its square over half of its variance.
         let worth = |level: &dyn Fn(usize) -> f64, each: &dyn Fn(usize) -> f64| -> Vec<f64> {
-            let spread = sums(&|order| (weights[order] * each(order)).powi(2) * noise.shared(order));
-            let spread = spread.into_iter().enumerate();
-            spread.map(|(order, sum)| (level(order) * all[order]).powi(2) / sum.max(f64::MIN_POSITIVE)).collect()
+            let term = |order: usize| weights[order] * each(order);
+            let linear = sums(&term);
+            let own = sums(&|order| term(order).powi(2));
+            let over = sums(&|order| term(order).powi(2) * noise.over_squares(order));
+            let spread = |order: usize| noise.of_sum([linear[order], own[order], over[order]]).max(f64::MIN_POSITIVE);
+            (0..count).map(|order| (level(order) * all[order]).powi(2) / spread(order)).collect()
         };
         let without_waves = worth(&|order| of_noise[order], &variance);
         let with_waves = worth(&|order| raw(order) + of_noise[order], &|order| raw(order) + variance(order));

@@ -8,7 +8,7 @@ use std::f64::consts::TAU;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{ChiSquared, Distribution, StandardNormal};
-use runout_draws::{Draws, Measured};
+use runout_draws::{Draws, Measured, VarianceFrom};
 use runout_numerics::{Complex64, fourier::Fourier};
 
 const ORDERS: usize = 120;
@@ -196,7 +196,11 @@ fn cells(form: Form, of_three_sensors: bool, std_um: f64, known: Known, trials: 
                 (exact.iter().map(|variance| times * times * variance).collect(), vec![0; ORDERS + 1])
             }
         };
-        let draws = Draws::of_section(&Measured { harmonics, variance, squares, lowest: 2 }, trial).unwrap();
+        let draws = Draws::of_section(
+            &Measured { harmonics, variance, squares, variance_from: VarianceFrom::OrdersBeside, lowest: 2 },
+            trial,
+        )
+        .unwrap();
         let of_truth = |profile: usize| {
             values(profile, fourier.synthesise(truth.iter().enumerate().map(|(n, c)| c * weight(profile, n))))
         };

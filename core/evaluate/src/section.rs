@@ -4,7 +4,7 @@ use std::cell::OnceCell;
 
 use super::{Content, Evaluate, Filter, Group, Label, NumberFound, POINTS_A_WAVE, labelled};
 use crate::Value;
-use runout_draws::{Draws, Interval, Measured, Uncertainty, noise_95, seed, stands_out, student_95};
+use runout_draws::{Draws, Interval, Measured, Uncertainty, VarianceFrom, noise_95, seed, stands_out, student_95};
 use runout_numerics::{Complex64, fourier::Fourier};
 use runout_standards::roundness::{Angles, Points, Reference, Undetermined};
 use runout_turning::{
@@ -97,6 +97,8 @@ pub(super) struct Form {
     pub(super) variance: Vec<f64>,
     /// Real degrees of freedom behind it, by order; 0 where it is taken as exact.
     pub(super) freedom: Vec<usize>,
+    /// Which orders share it.
+    pub(super) variance_from: VarianceFrom,
     pub(super) held: Content,
     pub(super) angles: usize,
     pub(super) radius_mm: f64,
@@ -127,7 +129,7 @@ impl Form {
             shows_weakened: false,
             shows_absent: result.absent_um(section) > 0.0,
         };
-        let variance = separation.noise_variance(unknown);
+        let variance: Vec<f64> = separation.noise_variance(unknown).collect();
         let above = held.half_power_upr.map_or(usize::MAX, |half| half as usize + 1);
         let weakened = separation.coefficients(unknown).skip(above.max(2));
         let shows_weakened = weakened.zip(variance.iter().skip(above.max(2))).any(|(value, of)| stands_out(value, *of));
@@ -138,6 +140,7 @@ impl Form {
             equivalents: separation.equivalent_coefficients(unknown).map(from_two).collect(),
             variance,
             freedom: (0..=separation.max_order()).map(|order| separation.degrees_of_freedom(order)).collect(),
+            variance_from: separation.variance_from,
             angles: result.angles,
             radius_mm,
             seed: seed(&[&result.station, &at.id]),
@@ -297,7 +300,8 @@ impl Form {
     pub(super) fn draws(&self) -> Option<&Draws> {
         let of = || {
             let (harmonics, variance) = (self.harmonics.clone(), self.variance.clone());
-            Draws::of_section(&Measured { harmonics, variance, squares: self.freedom.clone(), lowest: 2 }, self.seed)
+            let (squares, variance_from) = (self.freedom.clone(), self.variance_from);
+            Draws::of_section(&Measured { harmonics, variance, squares, variance_from, lowest: 2 }, self.seed)
         };
         self.draws.get_or_init(of).as_ref()
     }

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use super::{Content, Filter, Label, NumberFound, POINTS_A_WAVE, labelled};
 use crate::Value;
-use runout_draws::{Draws, Errors, Interval, Measured, seed};
+use runout_draws::{Draws, Errors, Interval, Measured, VarianceFrom, seed};
 use runout_numerics::{
     Complex64,
     fourier::{Fourier, max_order},
@@ -46,6 +46,8 @@ pub(super) struct Ring {
     pub(super) used: f64,
     /// Sources of its errors: a seed, and what they make of each order.
     pub(super) noise: Vec<(u64, Vec<Complex64>)>,
+    /// Degrees of freedom of the readings that all orders have their variance from; nothing where they do not have it from one.
+    pub(super) readings_freedom: Option<usize>,
 }
 
 impl Ring {
@@ -79,6 +81,7 @@ impl Wall {
                 gaps: section.gaps.clone(),
                 used: section.used,
                 noise: section.noise.iter().map(source).collect(),
+                readings_freedom: section.readings_freedom,
             }
         });
         let rings: Vec<Ring> = rings.collect();
@@ -144,12 +147,15 @@ impl Wall {
     /// What is known of values of the wall; nothing where some section has no known error.
     fn known(&self, filter: &Filter, mut values: impl FnMut(Look<'_>, &mut Vec<f64>)) -> Vec<Interval> {
         let lowest = self.lowest();
+        let all_of_readings = self.rings.iter().all(|ring| ring.readings_freedom.is_some());
+        let variance_from = if all_of_readings { VarianceFrom::Readings } else { VarianceFrom::OrdersBeside };
         let measured: Vec<Measured> = (self.rings.iter())
             .map(|ring| Measured {
                 harmonics: ring.harmonics.clone(),
                 variance: ring.variance.clone(),
-                // Amplitudes of the sources are as wide as their variances are badly known.
-                squares: Vec::new(),
+                // Without them, amplitudes of the sources are as wide as their variances are badly known.
+                squares: ring.readings_freedom.map_or_else(Vec::new, |freedom| vec![freedom; ring.harmonics.len()]),
+                variance_from,
                 lowest,
             })
             .collect();

@@ -7,7 +7,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::{profile::Profile, rig::Rig};
-use runout_draws::{Draws, Measured, Uncertainty, seed};
+use runout_draws::{Draws, Measured, Uncertainty, VarianceFrom, seed};
 use runout_numerics::{Complex64, fourier::Fourier};
 use runout_standards::roundness::ront_lsci_um;
 
@@ -161,7 +161,10 @@ fn run_out(mean: &[Complex64], variance: Option<Vec<f64>>, squares: usize, seed:
     let tir_um = ront_lsci_um(Fourier::new(points).synthesise(harmonics.iter().copied()));
     let draws = variance.and_then(|variance| {
         let squares = vec![squares; harmonics.len()];
-        Draws::of_section(&Measured { harmonics, variance, squares, lowest: 1 }, seed)
+        Draws::of_section(
+            &Measured { harmonics, variance, squares, variance_from: VarianceFrom::OrdersBeside, lowest: 1 },
+            seed,
+        )
     });
     let known = draws.and_then(|draws| {
         let profiles = draws.profiles(|_| Complex64::ONE, points, |_, _| ());

@@ -5,6 +5,7 @@ mod quantity;
 pub use crate::residual::{OrderResidual, ReadingResidual, Residual};
 use crate::{azimuth::Azimuth, smoothing::orders_beside};
 pub use quantity::{ALONG_COLUMN, MotionColumn, Quantity, motion_columns};
+pub use runout_draws::VarianceFrom;
 use runout_draws::{NORMAL_95, student_95};
 use runout_numerics::Complex64;
 use runout_standards::gaps::Gaps;
@@ -99,7 +100,8 @@ pub struct Separation {
     pub unknowns: Vec<Quantity>,
     /// Estimates `[order][unknown]` from order 0; NaN where not observable.
     pub estimate: Vec<Complex64>,
-    /// Variance E|δ|² of each estimate `[order][unknown]`; NaN where not known.
+    /// Variance E|δ|² that noise gives each estimate `[order][unknown]`; NaN where not known. [`variance_of`](Self::variance_of) has what the
+    /// data do not decide besides.
     pub variance: Vec<f64>,
     /// Covariance E[δ δᴴ] of the motions among `unknowns`, `[order][motion][motion]` from order 0; what is not observable means
     /// nothing. `None` where it is not known.
@@ -107,11 +109,13 @@ pub struct Separation {
     /// Covariance E[δ δᴴ] of the forms among `unknowns`, `[order][form][form]` from order 0: sections of a station
     /// share the errors of its motion. What is not observable means nothing. `None` where it is not known.
     pub form_covariance: Option<Vec<Complex64>>,
-    /// Real degrees of freedom behind `variance` at an order that was looked at by itself; 0 where it is taken as exact.
-    /// [`degrees_of_freedom`](Self::degrees_of_freedom) gives those of any order.
+    /// Real degrees of freedom behind `variance` at an order that was looked at by itself, or of the readings that all orders have it from; 0 where it
+    /// is taken as exact. [`degrees_of_freedom`](Self::degrees_of_freedom) gives those of any order.
     pub freedom: usize,
+    /// Which orders share them.
+    pub variance_from: VarianceFrom,
     /// Other estimates `[order][unknown]` that agree with the readings as well, less `estimate`: one of them is true, and
-    /// the data do not decide which. `variance` and `motion_covariance` include them; none where the data decide.
+    /// the data do not decide which; none where the data decide.
     pub equivalents: Vec<Vec<Complex64>>,
     /// Whether it is observable with the layout, `[order][unknown]`.
     pub observable: Vec<bool>,
@@ -183,9 +187,8 @@ impl Separation {
         (self.estimate.len() / self.unknowns.len().max(1)).saturating_sub(1)
     }
 
-    /// The weighted mean of estimates that agree with the readings equally well; the rest is that of the first. The largest
-    /// squared distance from the mean is added to the variance, so that each of them lies within one standard uncertainty of
-    /// it. An order is observable where it is in all of them.
+    /// The weighted mean of estimates that agree with the readings equally well, with their distances from it; the rest is that of the first.
+    /// An order is observable where it is in all of them.
     #[must_use]
     pub fn mixture(weights: &[f64], equivalents: &[Self]) -> Option<Self> {
         let mut mixture = equivalents.first()?.clone();
@@ -204,10 +207,10 @@ impl Separation {
             entries.collect()
         });
         mixture.equivalents = distances.collect();
-        for (index, variance) in mixture.variance.iter_mut().enumerate() {
-            *variance += largest(mixture.equivalents.iter().map(|distance| distance[index]));
+        for (index, entry) in mixture.motion_covariance.iter_mut().flatten().enumerate() {
+            let of = |one: &Self| one.motion_covariance.as_ref().and_then(|joint| joint.get(index)).copied();
+            *entry = weights.iter().zip(equivalents).map(|(weight, one)| of(one).unwrap_or_default() * *weight).sum();
         }
-        mixture.mix_motion_covariance(weights, equivalents);
         // What the data do not decide is no error that sections share.
         mixture.form_covariance = mixture.form_covariance.filter(|_| equivalents.len() < 2);
         Some(mixture)
@@ -216,7 +219,10 @@ impl Separation {
     /// Real degrees of freedom behind the variance of an order; 0 where it is taken as exact.
     #[must_use]
     pub fn degrees_of_freedom(&self, order: usize) -> usize {
-        self.freedom * (2 * orders_beside(order) + 1)
+        match self.variance_from {
+            VarianceFrom::OrdersBeside => self.freedom * (2 * orders_beside(order) + 1),
+            VarianceFrom::Readings => self.freedom,
+        }
     }
 
     /// Factors by order that make errors with the stated variance as wide as the variance is badly known: Student's 95
@@ -226,49 +232,10 @@ impl Separation {
         (0..=self.max_order()).map(|order| student_95(self.degrees_of_freedom(order) as f64) / NORMAL_95).collect()
     }
 
-    /// The weighted mean of the equivalents' covariance of motions, and what they differ by.
-    fn mix_motion_covariance(&mut self, weights: &[f64], equivalents: &[Self]) {
-        let Some(mut joint) = self.motion_covariance.take() else { return };
-        for (index, entry) in joint.iter_mut().enumerate() {
-            let of = |one: &Self| one.motion_covariance.as_ref().and_then(|joint| joint.get(index)).copied();
-            *entry = weights.iter().zip(equivalents).map(|(weight, one)| of(one).unwrap_or_default() * *weight).sum();
-        }
-        joint.iter_mut().zip(self.undecided_motion()).for_each(|(entry, undecided)| *entry += undecided);
-        self.motion_covariance = Some(joint);
-    }
-
-    /// What the equivalents add to the covariance of motions, `[order][motion][motion]`: motions of one equivalent go together, so it
-    /// is the sum of their distances' products, scaled to the largest square of each.
-    fn undecided_motion(&self) -> Vec<Complex64> {
-        let width = self.unknowns.len();
-        let motions: Vec<usize> = (0..width).filter(|unknown| !self.unknowns[*unknown].is_form()).collect();
-        let mut products = Vec::with_capacity((self.max_order() + 1) * motions.len() * motions.len());
-        for order in 0..=self.max_order() {
-            let distances =
-                |motion: usize| self.equivalents.iter().map(move |distance| distance[order * width + motion]);
-            let scale = |motion: usize| {
-                let sum: f64 = distances(motion).map(|distance| distance.norm_sqr()).sum();
-                if sum > 0.0 { (largest(distances(motion)) / sum).sqrt() } else { 0.0 }
-            };
-            for row in &motions {
-                for column in &motions {
-                    let sum: Complex64 = distances(*row).zip(distances(*column)).map(|(a, b)| a * b.conj()).sum();
-                    let factor = scale(*row) * scale(*column);
-                    products.push(if factor > 0.0 { sum * factor } else { Complex64::ZERO });
-                }
-            }
-        }
-        products
-    }
-
-    /// The same estimates with the covariance of motions that comes from noise alone, and each of the equivalents with it: what the data
-    /// do not decide adds to no range, as noise does.
+    /// The same estimates as if the data decided for them, and for each of the equivalents.
     #[must_use]
     pub fn decided(&self) -> (Self, Vec<Self>) {
-        let mut own = Self { equivalents: Vec::new(), ..self.clone() };
-        if let Some(joint) = &mut own.motion_covariance {
-            joint.iter_mut().zip(self.undecided_motion()).for_each(|(entry, undecided)| *entry -= undecided);
-        }
+        let own = Self { equivalents: Vec::new(), ..self.clone() };
         let moved = |distance: &Vec<Complex64>| {
             let estimate = own.estimate.iter().zip(distance).map(|(value, distance)| value + distance).collect();
             Self { estimate, ..own.clone() }
@@ -277,13 +244,17 @@ impl Separation {
         (own, equivalents)
     }
 
-    /// Variance of the harmonics `[order]` of one unknown that comes from noise alone, without what the data do not decide.
+    /// Variance of an estimate `[order][unknown]` with the largest squared distance of the equivalents, so that each of them lies within one
+    /// standard uncertainty; NaN where not known.
     #[must_use]
-    pub fn noise_variance(&self, unknown: usize) -> Vec<f64> {
-        let width = self.unknowns.len();
-        let open = |index: usize| largest(self.equivalents.iter().map(|distance| distance[index]));
-        let each = self.variance.iter().enumerate().skip(unknown).step_by(width.max(1));
-        each.map(|(index, variance)| (variance - open(index)).max(0.0)).collect()
+    pub fn variance_of(&self, place: usize) -> f64 {
+        let noise = self.variance.get(place).copied().unwrap_or(f64::NAN);
+        noise + largest(self.equivalents.iter().filter_map(|distance| distance.get(place).copied()))
+    }
+
+    /// Variance by order from 0 that noise gives one unknown.
+    pub fn noise_variance(&self, unknown: usize) -> impl Iterator<Item = f64> + '_ {
+        self.variance.iter().skip(unknown).step_by(self.unknowns.len().max(1)).copied()
     }
 
     /// Coefficients of one unknown by order from 0, in each of the equivalents; 0 where not observable.
@@ -338,8 +309,7 @@ impl Separation {
     #[must_use]
     pub fn coefficient_std(&self, place: usize) -> f64 {
         let bound = self.bound_of(place % self.unknowns.len().max(1));
-        let variance = self.variance.get(place).copied().unwrap_or(f64::NAN);
-        (variance + bound * bound / 6.0).sqrt()
+        (self.variance_of(place) + bound * bound / 6.0).sqrt()
     }
 
     /// Orders (from 1) at which one unknown is not observable.
@@ -362,16 +332,8 @@ impl Separation {
         }
         let width = self.unknowns.len();
         let seen = self.observable.iter().skip(unknown).step_by(width.max(1));
-        let sum: f64 = self
-            .variance
-            .iter()
-            .skip(unknown)
-            .step_by(width.max(1))
-            .zip(seen)
-            .skip(1)
-            .filter(|(_, seen)| **seen)
-            .map(|(variance, _)| variance)
-            .sum();
+        let seen = seen.enumerate().skip(1).filter(|(_, seen)| **seen);
+        let sum: f64 = seen.map(|(order, _)| self.variance_of(order * width + unknown)).sum();
         let bound = self.bound_of(unknown);
         (0.5 * sum + bound * bound / 12.0).sqrt()
     }

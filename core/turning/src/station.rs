@@ -60,7 +60,7 @@ impl StationResult {
         let unknown = separation.position(Quantity::Form(section)).filter(|unknown| !separation.is_lost(*unknown))?;
         let squares = || separation.coefficients(unknown).skip(2).map(|value| value.norm_sqr());
         let rms = (0.5 * squares().sum::<f64>()).sqrt();
-        let variance = separation.variance.iter().skip(unknown).step_by(separation.unknowns.len().max(1)).skip(2);
+        let variance = (2..).map(|order| separation.variance_of(order * separation.unknowns.len() + unknown));
         let errors = squares().zip(variance).filter(|(square, _)| *square > 0.0);
         let spread: f64 = errors.map(|(square, variance)| square * variance).sum();
         Some((rms, (spread / 8.0).sqrt() / rms))

@@ -17,7 +17,7 @@ use runout_core::{
         linear_terms::{Declared, HeldOut, LinearFit, LinearTerms, Observations, Term},
     },
     points::Points,
-    separation::{Quantity, Residual, Separation},
+    separation::{Quantity, Residual, Separation, VarianceFrom},
     stage::{Evaluable, Form, LinearModel, Outcome},
 };
 
@@ -263,6 +263,7 @@ impl LeastSquaresCylinder {
             estimate,
             variance,
             freedom: fit.remainder().dof,
+            variance_from: VarianceFrom::Readings,
             residual: Residual {
                 rms_um: fit.remainder().rms,
                 expected_rms_um: f64::NAN,

@@ -14,7 +14,7 @@ use runout_core::{
         PointKind::{Number, Trace as TraceId, TraceKind},
         Points, Trace,
     },
-    separation::{Quantity, Residual, Separation},
+    separation::{Quantity, Residual, Separation, VarianceFrom},
     stage::{Evaluable, EvaluableKind, Form, Outcome, PointModel, PointSeparator, Separator, residual_table},
     surface::Surface,
     table::TableSpec,
@@ -250,6 +250,7 @@ impl LeastSquaresCylinder {
             estimate,
             variance,
             freedom: fit.dof,
+            variance_from: VarianceFrom::Readings,
             residual: Residual {
                 rms_um: fit.residual_rms_um,
                 expected_rms_um: f64::NAN,

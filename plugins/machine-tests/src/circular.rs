@@ -15,7 +15,7 @@ use std::f64::consts::TAU;
 use runout_core::{
     Complex64, Result,
     consistency::Check,
-    draws::{DrawnErrors, Draws, Interval, Measured, Uncertainty, seed},
+    draws::{DrawnErrors, Draws, Interval, Measured, Uncertainty, VarianceFrom, seed},
     fault::Fault,
     numerics::fourier::Fourier,
     pipeline::{Context, StageConfig},
@@ -157,7 +157,8 @@ impl Circular {
             fourier.analyse(mean.iter().copied(), &mut harmonics);
             let variance: Vec<f64> = noise.variance.iter().map(|variance| variance / turns.len() as f64).collect();
             sources.push(vec![(seed_of(*sign), variance.iter().map(|variance| variance.sqrt().into()).collect())]);
-            measured.push(Measured { harmonics, squares: vec![noise.squares; variance.len()], variance, lowest: 0 });
+            let (squares, variance_from) = (vec![noise.squares; variance.len()], VarianceFrom::OrdersBeside);
+            measured.push(Measured { harmonics, variance, squares, variance_from, lowest: 0 });
         }
         let Some(draws) = Draws::of(&measured, sources, seed_of(1)) else { return Vec::new() };
         let profiles = draws.profiles(|_| Complex64::ONE, paths.angles, |_, _| ());

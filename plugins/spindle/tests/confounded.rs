@@ -70,7 +70,7 @@ fn compared(separation: &Separation, quantities: &[(Quantity, Vec<Complex64>)]) 
             let index = order * width + unknown;
             if separation.observable[index] {
                 error += 0.5 * (separation.estimate[index] - truth[order]).norm_sqr();
-                stated += 0.5 * separation.variance[index];
+                stated += 0.5 * separation.variance_of(index);
             }
         }
     }

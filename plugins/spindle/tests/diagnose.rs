@@ -248,7 +248,7 @@ fn odd_orders(separation: &Separation, truth: &StationTruth) -> (f64, f64) {
         let (unknown, width) = (separation.position(Quantity::Form(section)).unwrap(), separation.unknowns.len());
         for order in (3..60).step_by(2) {
             error += (separation.estimate[order * width + unknown] - harmonics[order]).norm_sqr();
-            stated += separation.variance[order * width + unknown];
+            stated += separation.variance_of(order * width + unknown);
         }
     }
     ((0.25 * error).sqrt(), (0.25 * stated).sqrt())
@@ -299,7 +299,7 @@ fn errors_over_stated(separation: &Separation, truth: &StationTruth) -> [[f64; 2
         let of_order = |order: usize| {
             let truth = if quantity.is_form() { harmonics[order] } else { harmonics[order].conj() };
             let index = order * width + unknown;
-            [(separation.estimate[index] - truth).norm_sqr(), separation.variance[index]]
+            [(separation.estimate[index] - truth).norm_sqr(), separation.variance_of(index)]
         };
         band.clone().map(of_order).fold([0.0; 2], |sum, one| [sum[0] + one[0], sum[1] + one[1]])
     };

@@ -104,7 +104,7 @@ fn errors_and_variances(separation: &Separation, truth: &StationTruth) -> [f64; 
             across += (turned.conj() * error).re;
             along += turned.norm_sqr();
             all.push((error, turned));
-            sums[1] += separation.variance[index];
+            sums[1] += separation.variance_of(index);
         }
     }
     let common = across / along;
@@ -186,7 +186,7 @@ fn a_tone_near_an_order_is_in_the_uncertainty() {
             Fourier::new(curve.len()).analyse(curve.iter().copied(), &mut harmonics);
             let index = 2 * width + separation.position(Quantity::Form(section)).unwrap();
             sums[0] += (separation.estimate[index] - harmonics[2]).norm_sqr();
-            sums[1] += separation.variance[index];
+            sums[1] += separation.variance_of(index);
         }
     }
     let ratio = (sums[0] / sums[1]).sqrt();

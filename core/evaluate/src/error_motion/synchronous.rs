@@ -57,7 +57,8 @@ impl Synchronous {
         let mut harmonics = vec![Complex64::ZERO; self.variance.len().min(fourier.max_order() + 1)];
         fourier.analyse(seen.iter().copied(), &mut harmonics);
         let (variance, squares) = (self.variance[..harmonics.len()].to_vec(), self.freedom.clone());
-        let draws = Draws::of_section(&draws::Measured { harmonics, variance, squares, lowest }, seed);
+        let variance_from = draws::VarianceFrom::OrdersBeside;
+        let draws = Draws::of_section(&draws::Measured { harmonics, variance, squares, variance_from, lowest }, seed);
         let angles = Angles::shared(count);
         // Without the mean, about which the root mean square is.
         let weight = |order: usize| if order == 0 { Complex64::ZERO } else { Complex64::ONE };

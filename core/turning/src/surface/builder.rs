@@ -9,7 +9,7 @@ use crate::{
     separation::{Quantity, SectionAt},
     station::StationResult,
 };
-use runout_draws::Errors;
+use runout_draws::{Errors, VarianceFrom};
 use runout_error::{Error, ErrorKind, Result};
 use runout_numerics::{
     Complex64,
@@ -66,7 +66,20 @@ impl SurfaceBuilder {
             let SectionAt { id, z_mm, gaps, used, .. } = at.clone();
             let (station, half_power_upr) = (result.station.clone(), result.half_power_upr());
             let absent_um = result.absent_um(index);
-            self.sections.push(Section { id, station, z_mm, gaps, used, half_power_upr, absent_um, orders, noise });
+            let is_of_readings = separation.variance_from == VarianceFrom::Readings;
+            let readings_freedom = is_of_readings.then_some(separation.freedom);
+            self.sections.push(Section {
+                id,
+                station,
+                z_mm,
+                gaps,
+                used,
+                half_power_upr,
+                absent_um,
+                orders,
+                noise,
+                readings_freedom,
+            });
         }
     }
 

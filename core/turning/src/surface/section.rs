@@ -26,6 +26,8 @@ pub struct Section {
     pub orders: Vec<Option<Order>>,
     /// What noise its errors are made of, as wide as their variance is badly known.
     pub noise: Vec<Noise>,
+    /// Degrees of freedom of the readings that all orders have their variance from; nothing where they do not have it from one.
+    pub readings_freedom: Option<usize>,
 }
 
 /// A source of noise of a station, shared by its sections.
@@ -86,7 +88,7 @@ pub(super) fn noise(separation: &Separation, orders: usize) -> Vec<Vec<Noise>> {
     let (mut factor, mut total) = (vec![Complex64::ZERO; sections * sections], vec![0.0; sections]);
     for order in 0..orders {
         for row in 0..sections {
-            let variance = forms[row].and_then(|form| separation.variance.get(order * width + form).copied());
+            let variance = forms[row].map(|form| separation.variance_of(order * width + form));
             // Of what is not known, nothing is drawn.
             let variance = variance.filter(|variance| variance.is_finite() && *variance > 0.0).unwrap_or(0.0);
             let mut left = variance;
@@ -117,7 +119,7 @@ pub(super) fn noise(separation: &Separation, orders: usize) -> Vec<Vec<Noise>> {
 pub(super) fn orders(separation: &Separation, unknown: usize) -> Vec<Option<Order>> {
     let width = separation.unknowns.len();
     let seen = separation.observable.iter().skip(unknown).step_by(width);
-    let variances = separation.variance.iter().skip(unknown).step_by(width).copied().chain(std::iter::repeat(f64::NAN));
+    let variances = (0..).map(|order| separation.variance_of(order * width + unknown));
     separation
         .coefficients(unknown)
         .zip(seen)

@@ -71,7 +71,7 @@ impl Estimates {
             unknowns: separation.unknowns.clone(),
             motion_z_mm: separation.motion_z_mm,
             values: separation.estimate.clone(),
-            variance: separation.variance.clone(),
+            variance: (0..separation.estimate.len()).map(|place| separation.variance_of(place)).collect(),
             observable: separation.observable.clone(),
             sensitivity,
         }

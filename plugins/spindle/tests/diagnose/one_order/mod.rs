@@ -117,7 +117,7 @@ fn what_a_layout_leaves_open_of_a_motion_is_stated() {
             let mut harmonics = vec![Complex64::ZERO; 4];
             Fourier::new(curve.len()).analyse(curve.iter().copied(), &mut harmonics);
             let index = 3 * after.unknowns.len() + after.position(Quantity::Form(section)).unwrap();
-            let (error, std) = ((after.estimate[index] - harmonics[3]).norm(), after.variance[index].sqrt());
+            let (error, std) = ((after.estimate[index] - harmonics[3]).norm(), after.variance_of(index).sqrt());
             println!("simulated, seed {seed}: section {section}, order 3 is {error:.4} µm off, {std:.4} µm stated");
             // Of a complex number, three standard deviations are exceeded once in 8000.
             assert!(error < 3.0 * std && std < 0.3, "{error} {std}");
