@@ -36,8 +36,9 @@ const EVIDENT: f64 = 20.0;
 /// Share of the turns that are held out.
 const HELD_OUT: f64 = 0.2;
 
-/// Standard deviations of the noise of so many data from which an effect is named in nine of ten measurements: its evidence is sufficient, and it lowers the
-/// χ² of held-out data by the share that is asked for.
+/// Standard deviations of the noise of so many data from which an effect whose signature is that foreseen is named in nine of ten measurements: its evidence
+/// is sufficient, and it lowers the χ² of held-out data by the share that is asked for. A signature depends on the part: of parts drawn at random, every
+/// second one has it named.
 pub(super) fn named_from(data: usize) -> f64 {
     let held_out = NINE_OF_TEN + NINE_OF_TEN.mul_add(NINE_OF_TEN, HELD_OUT_GAIN * data as f64).sqrt();
     (EVIDENT.sqrt() + NINE_OF_TEN).max(held_out / HELD_OUT.sqrt())

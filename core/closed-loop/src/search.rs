@@ -283,7 +283,9 @@ impl<M: Model> Tracing<'_, M> {
             // Where one explains too little, so do the others; what held-out data, correlated errors or blocks refuse says nothing of them.
             let ends = too_little.is_some() && keys.refused.is_none();
             let raises = || raises_held_out(&before, &trial.fit, self.model.is_seen_besides(effect));
-            let doubt = too_little.or(keys.refused).or_else(|| raises().then(|| no_gain(&before, &trial.fit)));
+            // Errors that depended on each other by what this one takes away say nothing against it.
+            let refused = keys.refused.filter(|_| too_little.is_some() || !self.explains_all(&trial));
+            let doubt = too_little.or(refused).or_else(|| raises().then(|| no_gain(&before, &trial.fit)));
             match doubt {
                 Some(reason) => self.refuse(effect, reason),
                 None => believed = Some((effect, trial, stated)),
@@ -319,6 +321,12 @@ impl<M: Model> Tracing<'_, M> {
             alone.push(refit.settings.last().map(|setting| setting.values.clone()).unwrap_or_default());
         }
         Some(FoundEffect { members, alone, values, std, evidence, before, after })
+    }
+
+    /// Whether nothing but known noise is left, also by the tests of whether errors depend on each other.
+    fn explains_all(&self, trial: &Refit<Remainder>) -> bool {
+        let is_noise = |fit: M::Fit| at_the_floor(fit.remainder()) && noise_only(fit.remainder(), &fit.consistency());
+        trial.fit.noise_is_known() && at_the_floor(&trial.fit) && self.model.fit(&trial.settings).is_ok_and(is_noise)
     }
 
     /// What an effect takes away: the direction in which its fit changed the residual, and its signature where it has more parameters. Of an

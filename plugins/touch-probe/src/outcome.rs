@@ -5,7 +5,7 @@ use std::{collections::HashSet, f64::consts::TAU};
 use runout_core::{
     Complex64, Result,
     closed_loop::diagnosis::LostOrders,
-    separation::{Quantity, Residual, SectionAt, Separation},
+    separation::{Quantity, Residual, SectionAt, Separation, VarianceFrom},
     stage::{Evaluable, Form, Outcome, far_below_noise},
     summary::Value,
     table::{TableRows, counts, flags, numbers},
@@ -253,6 +253,7 @@ impl TouchSolution<'_> {
                 Noise::Repeats(dof) => dof,
                 Noise::Residual => self.fit.solved.dof,
             },
+            variance_from: VarianceFrom::Readings,
             observable,
             residual: Residual {
                 rms_um,

@@ -102,6 +102,19 @@ fn every_effect_is_named_with_its_size() {
     }
 }
 
+/// What a scale leaves depends on the direction: errors beside each other are alike until it is taken away, and three setups cannot check it.
+#[test]
+fn a_scale_in_three_setups_is_no_reversal() {
+    for seed in 0..trials(24) as u64 {
+        let mut scenario = scenario(seed, &setups(&[(0.0, 0.0), (100.0, 0.0), (0.0, 80.0)]));
+        scenario.repeats = 4;
+        scenario.machine.scale_x = 200.0;
+        let found = diagnosed(&scenario, 15, None).diagnosis;
+        println!("{seed}: {:?} {:?} {:?}", found.verdict, named(&found), found.refused);
+        assert_eq!((named(&found), found.verdict), (vec!["axis-scale".to_owned()], Verdict::Explained), "{seed}");
+    }
+}
+
 #[test]
 fn orders_above_those_declared_are_named() {
     for (order, amplitude_um) in [(17, 1.0), (20, 8.0)] {
