@@ -6,6 +6,7 @@ use runout_error::{Error, Result};
 use runout_evaluate::height_grid::HeightGrid;
 use runout_turning::{input_file::InputFile, provenance::Input};
 
+mod coarse;
 pub mod measured;
 pub mod mistakes;
 

@@ -6,7 +6,7 @@ use runout_consistency::{Check, Test};
 use runout_error::{Error, ErrorKind, Result};
 use runout_numerics::number::significant;
 
-use super::{PointColumn, Points};
+use super::{PointColumn, Points, coarse::coarser_than_noise};
 
 /// Readings in a row that come again elsewhere are a copy from so many on.
 const STRETCH: usize = 8;
@@ -91,7 +91,9 @@ pub fn checks(points: &Points, columns: &[PointColumn]) -> Vec<Check> {
         .find_map(|(column, values)| copied(column.name, values));
     let codes = measured.iter().filter_map(|(column, values)| code(column.name, values));
     let codes: Vec<Check> = codes.collect();
-    copies.into_iter().chain(equal_columns(&measured)).chain(unmeasured(&measured)).chain(stuck).chain(codes).collect()
+    let coarse = coarser_than_noise(points, columns, &measured);
+    let of_columns = unmeasured(&measured).into_iter().chain(stuck).chain(codes).chain(coarse);
+    copies.into_iter().chain(equal_columns(&measured)).chain(of_columns).collect()
 }
 
 /// One number that stands several times at an end of a column, far beyond all others: a code for a missing value.
