@@ -155,14 +155,15 @@ impl Drift {
         let mut values: Vec<Value> = Vec::new();
         let mut squares = 0.0;
         for (index, value) in found.into_iter().enumerate() {
-            let [mut low, high] = [(&lows, 0.025), (&highs, 0.975)].map(|(draws, share)| {
+            let end = |draws: &[Vec<f64>], share: f64| {
                 let mut ends: Vec<f64> = draws.iter().map(|draw| draw[index]).collect();
                 ends.sort_by(f64::total_cmp);
                 ends[(share * (DRAWS - 1) as f64).round() as usize]
-            });
+            };
+            let (mut low, high) = (end(&lows, 0.025), end(&highs, 0.975));
             match names.get(index) {
-                Some(_) => squares += low * low,
-                // Axes that may all stand still may all stand still together.
+                // Of several axes that stand still, one does not seem to more often than a single one.
+                Some(_) => squares += end(&lows, 0.025 / names.len() as f64).powi(2),
                 None => low = low.min(squares.sqrt()),
             }
             let (symbol, about) = match names.get(index) {
