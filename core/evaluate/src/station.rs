@@ -2,7 +2,7 @@
 
 use crate::{
     Evaluate, Group, ReferenceCircle, Value, circles,
-    error_motion::{Centre, ErrorMotion, behind_low_pass, with_jitter_of_marks},
+    error_motion::{Centre, ErrorMotion, behind_low_pass, below_absent, with_jitter_of_marks},
     run_out,
     section::{missing_circles, section_values, steepest_um_per_deg},
 };
@@ -50,8 +50,7 @@ impl EvaluatedStation {
         result.separation.warnings.extend(missing);
         judge_among(&mut result, rig, stations);
         if let Some(by) = refuted_by(&result.separation.residual.checks) {
-            let all = values.iter_mut().flatten().chain(&mut motion_values);
-            all.for_each(|value| value.refuted_by = Some(by.clone()));
+            values.iter_mut().flatten().chain(&mut motion_values).for_each(|value| value.refuted_by = Some(by.clone()));
         }
         let circle = |(section, values): (usize, &Vec<Value>)| {
             circles::section_circles(&result, section, evaluate, radius_mm, rig, values)
@@ -69,6 +68,15 @@ impl EvaluatedStation {
             }
         }
         Self { result, values, circles, motion_values, readings }
+    }
+
+    /// The same, with what refutes all values of the form of which nothing of the station's own does.
+    #[must_use]
+    pub fn refuted_by(mut self, by: Option<&str>) -> Self {
+        for value in self.values.iter_mut().flatten() {
+            value.refuted_by = value.refuted_by.take().or_else(|| by.map(str::to_owned));
+        }
+        self
     }
 
     /// The first RONt of a section.
@@ -102,6 +110,8 @@ fn error_motion_values(result: &StationResult, centres: &[Centre], radius_mm: f6
     let slope = steepest.to_degrees() / (1e3 * radius_mm);
     let values = ErrorMotion { station, z_mm: *z_mm, angles: *angles, separation, profiles, slope }.values(centres);
     let values = with_jitter_of_marks(values, profiles);
+    let goes_on = profiles.iter().any(|profile| profile.absent_um > 0.0);
+    let values = if goes_on { below_absent(values) } else { values };
     match result.half_power_upr() {
         Some(half_power_upr) => behind_low_pass(values, separation, half_power_upr),
         None => values,

@@ -320,9 +320,9 @@ impl Averager for SynchronousAverage {
         count.rejected.sort_by_key(|turn| turn.turn);
         self.enough(&capture, &count, count.used)?;
 
-        if let Some(turn) = capture.median_turn_samples() {
-            resample::restore(&mut outcome, orders_held(turn) + 1, capture.channels());
-        }
+        let left_out_um = capture
+            .median_turn_samples()
+            .map_or(0.0, |turn| resample::restore(&mut outcome, orders_held(turn) + 1, capture.channels()));
         let most_angles = capture.median_turn_samples().map_or(usize::MAX, most_angles);
         let mean_turn = outcome.used_samples / outcome.used as f64;
         let speed_rpm = capture.sample_rate_hz.map(|rate_hz| 60.0 * rate_hz / mean_turn);
@@ -358,7 +358,7 @@ impl Averager for SynchronousAverage {
             sample_rate_hz: capture.sample_rate_hz,
             responses: capture.responses,
             bridged_beyond_rad: outcome.bridged_beyond_rad,
-            absent_um: outcome.absent_um,
+            absent_um: outcome.absent_um.max(left_out_um),
             warnings,
         };
         if profile.spread.is_some() {

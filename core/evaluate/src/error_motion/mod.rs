@@ -31,7 +31,7 @@ pub use names::{WITH_FUNDAMENTAL, is_along_axis, standing_symbols, symbols};
 pub use plots::{Spectrum, TurnsPlot};
 pub use polar::Centre;
 pub use standing::{Fundamental, StandingMotion, weights};
-pub use weakened::behind_low_pass;
+pub use weakened::{behind_low_pass, below_absent};
 
 use crate::Value;
 use names::{STANDARD, XYZ, chosen_id, described, fundamental_across, id, kind_of, over, place, unit};

@@ -1,4 +1,4 @@
-//! Error motion values behind a low-pass.
+//! Error motion values behind a low-pass, and below orders that are not there.
 
 use crate::Value;
 use runout_draws::stands_out;
@@ -13,11 +13,21 @@ pub fn behind_low_pass(mut values: Vec<Value>, separation: &Separation, half_pow
         if 0.5 * half_power_upr >= value.band_upr[1] as f64 {
             continue;
         }
-        let repeats = !value.symbol.starts_with("asynchronous");
-        value.weakened_above_upr = (weakened && repeats).then_some(half_power_upr);
+        value.weakened_above_upr = (weakened && repeats(value)).then_some(half_power_upr);
         value.band_upr[1] = value.band_upr[1].min(half_power_upr as usize).max(value.band_upr[0]);
     }
     values
+}
+
+/// The values where readings go on above the highest order of the averages: those of repeating motion lack it.
+#[must_use]
+pub fn below_absent(mut values: Vec<Value>) -> Vec<Value> {
+    values.iter_mut().filter(|value| repeats(value)).for_each(|value| value.absent_above_upr = Some(value.band_upr[1]));
+    values
+}
+
+fn repeats(value: &Value) -> bool {
+    !value.symbol.starts_with("asynchronous")
 }
 
 /// Whether a motion stands out from its noise above an order.
@@ -54,5 +64,12 @@ mod tests {
         assert!(of(20).eq([([2, 10], Some(10.8)), ([2, 10], None)]));
         assert!(of(8).eq([([2, 10], Some(10.8)), ([2, 10], None)]));
         assert!(of(3).eq([([2, 10], None), ([2, 10], None)]));
+    }
+
+    #[test]
+    fn repeating_motion_lacks_what_is_above_the_highest_order() {
+        let value = |symbol: &str| Value { band_upr: [2, 63], ..Value::referred(symbol, 1.0, "um", "", "LSC") };
+        let found = below_absent(["synchronous-radial-x", "asynchronous-radial-x"].map(value).into());
+        assert_eq!([found[0].absent_above_upr, found[1].absent_above_upr], [Some(63), None]);
     }
 }

@@ -61,7 +61,8 @@ impl PointResult<'_> {
     ) -> Result<Finished> {
         let Outcome { convention, tables, values, checks, evaluables, lost_orders, mut remarks, notes } = self.outcome;
         check_declared(&evaluables, &pipeline.route.evaluables())?;
-        let evaluated = Evaluated::of(&evaluables, &pipeline.evaluate, refuted_by(&checks).as_deref())?;
+        let refuted_by = refuted_by(&checks);
+        let evaluated = Evaluated::of(&evaluables, &pipeline.evaluate, refuted_by.as_deref())?;
         let mut writer = ResultWriter::begin(pipeline, exporters, &[])?;
         writer.corrected_for(self.effects);
         if let Some((diagnosis, of_run)) = self.diagnosis {
@@ -85,6 +86,7 @@ impl PointResult<'_> {
                     at.map_or((String::new(), f64::NAN), |section| (section.id.clone(), section.z_mm));
                 let result = StationResult { station, z_mm, angles, separation, profiles: Vec::new(), truth: None };
                 let station = EvaluatedStation::of(result, &pipeline.evaluate, radius_mm, None, 1);
+                let station = station.refuted_by(refuted_by.as_deref());
                 writer.take(&station, None)?;
                 observer.station(&station.result.station);
             }

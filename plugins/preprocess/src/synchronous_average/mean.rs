@@ -109,9 +109,7 @@ impl Mean {
             let noise = matrices.map(|matrix| matrix[channel * (channels + 1)].re).sum::<f64>() / HIGHEST as f64;
             let power = |harmonics: &[Complex64]| harmonics.iter().map(Complex64::norm_sqr).sum::<f64>();
             let (kept, above) = (power(&harmonics[2..orders]), power(&harmonics[orders..]));
-            let noise = noise * (held - orders) as f64;
-            let is_form = above > ABOVE_NOISE * noise && above - noise > LEAST_ABSENT * LEAST_ABSENT * kept;
-            if is_form { (0.5 * (above - noise)).sqrt() } else { 0.0 }
+            beyond_noise(above, noise * (held - orders) as f64, kept)
         };
         harmonics.chunks_exact(held).enumerate().map(of_channel).fold(0.0, f64::max)
     }
@@ -172,6 +170,12 @@ impl Mean {
         }
         Some(covariance)
     }
+}
+
+/// Root mean square in µm of orders of so much power that are left out, beyond their noise and beside those that are kept; 0 where it is not above these.
+pub(super) fn beyond_noise(above: f64, noise: f64, kept: f64) -> f64 {
+    let is_form = above > ABOVE_NOISE * noise && above - noise > LEAST_ABSENT * LEAST_ABSENT * kept;
+    if is_form { (0.5 * (above - noise)).sqrt() } else { 0.0 }
 }
 
 /// Turns on their way into the sums.

@@ -19,7 +19,7 @@ use super::{
     bridge::Bridges,
     encoder,
     kernel::{Interpolation, Kernel, REACH, on_sample},
-    mean::Analysis,
+    mean::{Analysis, beyond_noise},
     orders_held,
     outliers::{Outliers, PendingTurn, Verdict},
     passed::{self, Fractions},
@@ -327,8 +327,11 @@ fn is_smooth(mut number: usize) -> bool {
 
 /// Gives the orders, of so many that a turn holds, what did not pass of them, and leaves out those of which next to nothing did: they are not found to
 /// be 0, they are not there.
-pub(super) fn restore(outcome: &mut CaptureAverage, mut orders: usize, channels: usize) {
+///
+/// Gives the root mean square in µm of what turns that are turned against each other leave out.
+pub(super) fn restore(outcome: &mut CaptureAverage, mut orders: usize, channels: usize) -> f64 {
     let turned = outcome.angle_scatter.map(|scatter| scatter.passed(outcome.mean.len() / channels.max(1)));
+    let left_out = turned.as_deref().map_or(0.0, |turned| left_out(outcome, passed::held(turned), channels));
     let passed: Vec<Vec<Complex64>> = outcome.passed.iter().cloned().chain(turned).collect();
     for passed in passed {
         undo(outcome, &passed, channels);
@@ -344,6 +347,22 @@ pub(super) fn restore(outcome: &mut CaptureAverage, mut orders: usize, channels:
     if let Some(split) = &mut outcome.split {
         split::truncate(split, orders, channels);
     }
+    left_out
+}
+
+/// Root mean square of the orders of an average from one on beyond their noise, in µm of the channel that has most.
+fn left_out(outcome: &CaptureAverage, from: usize, channels: usize) -> f64 {
+    let Some(covariance) = &outcome.covariance else { return 0.0 };
+    let of_channel = |channel: usize| {
+        let power = |orders: &[Complex64]| -> f64 {
+            orders.iter().skip(channel).step_by(channels).map(Complex64::norm_sqr).sum()
+        };
+        let (kept, above) = outcome.mean.split_at((from * channels).min(outcome.mean.len()));
+        let noise =
+            covariance.chunks_exact(channels * channels).skip(from).map(|matrix| matrix[channel * (channels + 1)].re);
+        beyond_noise(power(above), noise.sum(), power(kept.get(2 * channels..).unwrap_or_default()))
+    };
+    (0..channels).map(of_channel).fold(0.0, f64::max)
 }
 
 /// Gives an average, and everything about it order by order, what did not pass.
