@@ -26,5 +26,6 @@ pub use errors::{DrawnErrors, Errors};
 pub use interval::Interval;
 pub use open::OpenErrors;
 pub use profiles::{Draws, KINDS, Profiles, Source};
-pub use section::{Measured, VarianceFrom};
+pub use section::Measured;
+pub use spectrum::VarianceFrom;
 pub use uncertainty::*;

@@ -136,7 +136,7 @@ mod tests {
     use rand_distr::{Distribution, StandardNormal};
 
     use super::*;
-    use crate::section::VarianceFrom;
+    use crate::spectrum::VarianceFrom;
 
     const ORDERS: usize = 1200;
     /// Orders that a low-pass leaves, and what it leaves of those above.

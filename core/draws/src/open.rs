@@ -19,7 +19,8 @@ use runout_numerics::{
 use crate::{
     interval::{Interval, Sides},
     profiles::wider,
-    section::{Measured, Section, VarianceFrom},
+    section::{Measured, Section},
+    spectrum::VarianceFrom,
 };
 
 /// Draws of each form, and the fewest of a long profile: all of them together look at about so many points.

@@ -10,7 +10,8 @@ use runout_numerics::{Complex64, fourier::Fourier};
 use crate::{
     errors::{DrawnErrors, Errors, largest},
     interval::{Interval, Sides},
-    section::{Form, Measured, Section, VarianceFrom, known_together},
+    section::{Form, Measured, Section, known_together},
+    spectrum::VarianceFrom,
 };
 
 /// Transforms of each form, of [`TURNS`] draws each: with 100 draws the ends of an interval are the second from each end.

@@ -6,7 +6,7 @@ use runout_numerics::Complex64;
 
 use crate::{
     marks::{Marks, NARROW, WIDTHS_DEG},
-    spectrum::{Noise, Power, Spectrum},
+    spectrum::{Noise, Power, Spectrum, VarianceFrom},
 };
 
 /// Marks that stand out by so many standard deviations are certain; so many at most.
@@ -25,29 +25,6 @@ const SHOWN: f64 = 9.0;
 const SHOWN_MOST: f64 = 3.0;
 /// The error of an order that has more than this share of all noise does not average out: it is left as it is.
 const LARGE: f64 = 0.2;
-/// Orders that share one estimate of their variance, where it is that of orders beside each other.
-const TOGETHER: usize = 5;
-
-/// What the variances of orders were estimated from.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum VarianceFrom {
-    /// Each from itself and a few orders beside it.
-    #[default]
-    OrdersBeside,
-    /// All from one variance of readings: they are wrong together.
-    Readings,
-}
-
-impl VarianceFrom {
-    /// Orders that share an estimate, at most.
-    pub(crate) fn together(self) -> usize {
-        match self {
-            Self::OrdersBeside => TOGETHER,
-            Self::Readings => usize::MAX,
-        }
-    }
-}
-
 /// The harmonics of a section, and what is known of their errors, by order from 0.
 #[derive(Debug, Clone)]
 pub struct Measured {

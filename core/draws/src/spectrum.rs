@@ -4,8 +4,6 @@ use std::ops::Range;
 
 use runout_numerics::Complex64;
 
-use crate::section::VarianceFrom;
-
 /// Orders beside an order from which the power of waves is taken, to each side: a third of it, this at least.
 const FEWEST_BESIDE: usize = 4;
 /// A line is an order of more power than waves and noise have together, by a chance of e⁻⁹.
@@ -57,6 +55,29 @@ impl Sums {
 
     fn over(&self, orders: &Range<usize>) -> f64 {
         self.0[orders.end] - self.0[orders.start]
+    }
+}
+
+/// Orders that share one estimate of their variance, where it is that of orders beside each other.
+const TOGETHER: usize = 5;
+
+/// What the variances of orders were estimated from.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum VarianceFrom {
+    /// Each from itself and a few orders beside it.
+    #[default]
+    OrdersBeside,
+    /// All from one variance of readings: they are wrong together.
+    Readings,
+}
+
+impl VarianceFrom {
+    /// Orders that share an estimate, at most.
+    pub(crate) fn together(self) -> usize {
+        match self {
+            Self::OrdersBeside => TOGETHER,
+            Self::Readings => usize::MAX,
+        }
     }
 }
 

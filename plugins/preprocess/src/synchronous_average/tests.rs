@@ -136,24 +136,6 @@ fn what_lies_above_the_kept_orders_does_not_fold_onto_them() {
 }
 
 #[test]
-fn orders_that_scattering_marks_take_away_are_in_no_value() {
-    let (length, first, turns) = (1000.0, 40.0, 400);
-    let absent_um = |jitter: f64| {
-        let (mut of_marks, mut noise) = (scatter(3), scatter(4));
-        let mut normal = || (0..12).map(|_| of_marks()).sum::<f64>() / 2.0;
-        let marked: Vec<f64> = marks(first, length, turns + 1).iter().map(|mark| mark + jitter * normal()).collect();
-        let form = |angle: f64| 5.0 * (2.0 * angle).cos() + (20.0 * angle + 0.3).cos();
-        let channel = |frame: usize| form(TAU * (frame as f64 - first) / length) + 0.01 * noise();
-        let input = stream(&[(0..(turns + 2) * 1000).map(channel).collect()], marked);
-        let config = SynchronousAverageConfig { turn_tolerance_percent: 10.0, ..config(200) };
-        average_with(config, input).unwrap().absent_um
-    };
-    assert!(absent_um(0.0) < f64::MIN_POSITIVE, "{}", absent_um(0.0));
-    // The average keeps a quarter of order 20, which beside the scatter of 400 turns is seen.
-    assert!((0.05..0.4).contains(&absent_um(16.0)), "{}", absent_um(16.0));
-}
-
-#[test]
 fn turns_at_the_very_ends_are_used() {
     let length = 800.0;
     // A closing mark one past the last sample bounds the last turn; without it there is one turn less.
