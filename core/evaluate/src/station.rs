@@ -70,11 +70,13 @@ impl EvaluatedStation {
         Self { result, values, circles, motion_values, readings }
     }
 
-    /// The same, with what refutes all values of the form of which nothing of the station's own does.
+    /// The same, with what refutes the values and circles of the form that nothing of the station's own refutes.
     #[must_use]
     pub fn refuted_by(mut self, by: Option<&str>) -> Self {
-        for value in self.values.iter_mut().flatten() {
-            value.refuted_by = value.refuted_by.take().or_else(|| by.map(str::to_owned));
+        let of_values = self.values.iter_mut().flatten().map(|value| &mut value.refuted_by);
+        let of_circles = self.circles.iter_mut().flatten().map(|circle| &mut circle.refuted_by);
+        for refuted_by in of_values.chain(of_circles) {
+            *refuted_by = refuted_by.take().or_else(|| by.map(str::to_owned));
         }
         self
     }

@@ -11,6 +11,8 @@ use super::{PointColumn, Points};
 const HIDDEN: f64 = 0.6;
 /// Fewest degrees of freedom of repeats that show it.
 const FEWEST: usize = 8;
+/// Rows that are looked at, at most: a map has a million heights, and each row takes memory.
+const MOST_ROWS: usize = 50_000;
 /// Part of a step by which readings may be off it.
 const ON_STEP: f64 = 1e-6;
 /// Powers of ten below the largest reading at which steps are looked for.
@@ -65,7 +67,7 @@ fn repeats(points: &Points, columns: &[PointColumn], values: &[f64]) -> Option<(
             places.iter().enumerate().filter(|(of, _)| Some(*of) != left_out).map(|(_, place)| place[row]).collect()
         };
         let mut groups: HashMap<Vec<u64>, [f64; 3]> = HashMap::new();
-        for (row, value) in values.iter().enumerate().filter(|(_, value)| value.is_finite()) {
+        for (row, value) in values.iter().enumerate().take(MOST_ROWS).filter(|(_, value)| value.is_finite()) {
             // Welford's sums: count, mean, squares about it.
             let [count, mean, squares] = groups.entry(key(row)).or_default();
             *count += 1.0;
