@@ -12,12 +12,15 @@ from typing import Any, ClassVar, Literal, Union
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class External:
-    """A linear change of one channel by a program in any language"""
+    """A linear change of one channel, or of readings at points, by a program in any language"""
 
     plugin: ClassVar[str] = "external"
 
     about: Union[str, None] = None
     """What it is, in one line."""
+
+    columns: Union[Sequence[str], None] = None
+    """Columns of numbers that the program takes of measured points; without it, it changes a channel of turns."""
 
     command: Sequence[str]
     """The program and its arguments. It runs in the folder of the pipeline; a program whose name has a `/` is a path from there."""
@@ -27,6 +30,9 @@ class External:
 
     id: str
     """What `[diagnose] effects` and a diagnosis call it: words with `-` between them."""
+
+    labels: Union[Sequence[str], None] = None
+    """Columns of texts that it takes of measured points."""
 
     memory_mb: Union[int, None] = None
     """Most memory that the program may write to, in MB, on Linux; without it, as much as there is."""

@@ -138,6 +138,14 @@ class Effect(Protocol):
         """Reading over displacement at each of `orders` (from 0), never 0; 1 where all values are 0."""
 
 
+class PointEffect(Protocol):
+    """Something that adds to readings at measured points, in proportion to each of its parameters. As a plugin of a call it has `name`, `parameters`
+    (name, unit, usual size), `columns` and perhaps `labels`, as a separator of points has them."""
+
+    def change(self, points: dict[str, npt.NDArray[Any]], config: dict[str, Any]) -> Mapping[str, Mapping[str, npt.ArrayLike]]:
+        """What one unit of each parameter adds, by its name: an array over the points for each column of readings that it changes."""
+
+
 class Evaluator(Protocol):
     """Values of a result. As a plugin of a call it has `symbols`, pairs of symbol and unit."""
 
@@ -186,13 +194,14 @@ class Exporter(Protocol):
         """Writes each of `files` (name and path to write to); `summary` is that of `summary.json`."""
 
 
-Served = Union[TurnSeparator, Preprocessor, PointSeparator, Effect, Evaluator, Loader, Recordings, Exporter]
+Served = Union[TurnSeparator, Preprocessor, PointSeparator, Effect, PointEffect, Evaluator, Loader, Recordings, Exporter]
 
 _METHODS = {
     "separate-turns": "separate",
     "separate-points": "values",
     "preprocess": "preprocess",
     "transfer": "transfer",
+    "change": "change",
     "evaluate": "evaluate",
     "load-points": "load",
     "load-samples": "captures",
@@ -269,8 +278,7 @@ class Answering:
         return [_frame("harmonics", harmonics(station, values, std)), *(_text("warning", text) for text in station.warnings)]
 
     def _values(self, tables: dict[str, pa.Table], config: dict[str, Any]) -> list[bytes]:
-        points = {name: tables["points"][name].to_numpy() for name in tables["points"].column_names}
-        found = self._plugin.values(points, config)
+        found = self._plugin.values(_points(tables), config)
         values, left = found if isinstance(found, tuple) else (found, None)
         frames = [_frame("values", _values(values))]
         if left is not None:
@@ -305,11 +313,23 @@ class Answering:
             raise ValueError(f"transfer: expected one number an order, {len(orders)}, found the shape {found.shape}")
         return [_frame("transfer", pa.table({"order": orders, "re": found.real, "im": found.imag}))]
 
+    def _change(self, tables: dict[str, pa.Table], config: dict[str, Any]) -> list[bytes]:
+        points = _points(tables)
+        count = tables["points"].num_rows
+        found = {parameter: {name: np.asarray(of, float) for name, of in by.items()} for parameter, by in self._plugin.change(points, config).items()}
+        names = dict.fromkeys(name for by in found.values() for name in by)
+        columns = {name: [by.get(name, np.zeros(count)) for by in found.values()] for name in names}
+        for name, parts in columns.items():
+            for part in parts:
+                if part.shape != (count,):
+                    raise ValueError(f"change: expected one number a point, {count}, of `{name}`, found the shape {part.shape}")
+        table = {"parameter": [parameter for parameter in found for _ in range(count)], "row": np.tile(np.arange(count), len(found))}
+        return [_frame("change", pa.table(table | {name: np.concatenate(parts) for name, parts in columns.items()}))]
+
     def _load(self, tables: dict[str, pa.Table], config: dict[str, Any]) -> list[bytes]:
         wanted = [Column(**row) for row in tables["columns"].to_pylist()]
         found = self._plugin.load(self._about["path"], wanted, config)
         return [_frame("points", pa.table({name: np.asarray(column) for name, column in found.items()}))]
-
 
     def _captures(self, tables: dict[str, pa.Table], config: dict[str, Any]) -> list[bytes]:
         sensors = [sensor["id"] for sensor in json.loads(self._about["rig"])["sensors"]]
@@ -330,6 +350,10 @@ class Answering:
             _frame("captures", pa.Table.from_pylist(rows, schema=_CAPTURES)),
             _frame("marks", pa.table({**places, "at": at}, schema=_MARKS)),
         ]
+
+
+def _points(tables: dict[str, pa.Table]) -> dict[str, npt.NDArray[Any]]:
+    return {name: tables["points"][name].to_numpy() for name in tables["points"].column_names}
 
 
 def _request(source: BinaryIO) -> dict[str, Any] | None:

@@ -2,7 +2,7 @@
 
     runout.run("pipeline.toml", plugins=[HalfTheSum()], set={"separate": {"plugin": "half-the-sum"}})
 
-One of its methods says what an object is: `operator` a separator that is a linear formula, `transfer` an effect; `separate` and `values` separators of
+One of its methods says what an object is: `operator` a separator that is a linear formula, `transfer` an effect of a channel, `change` one of measured points; `separate` and `values` separators of
 turns and of points, `preprocess` a preprocessor of averages, `captures` a loader of recorded turns, `evaluate`, `load` and `export` what they say (`runout.external` has their types). `name` is what pipelines call it, in
 kebab-case; of other objects than formulas and effects it is that of the class without it. The first line of the docstring of its class says what it
 does.
@@ -66,11 +66,11 @@ class Effect(Protocol):
         """
 
 
-METHODS = ("operator", "transfer", "preprocess", "separate", "values", "load", "captures", "evaluate", "export")
+METHODS = ("operator", "transfer", "change", "preprocess", "separate", "values", "load", "captures", "evaluate", "export")
 """The method that says what an object is."""
 _SEPARATORS = ("operator", "separate", "values")
 _EXPECTED = (
-    "an object with the method `operator`, `separate` or `values` (a separator), `transfer` (an effect), `preprocess`, `evaluate`, `load`, `captures` or `export`"
+    "an object with the method `operator`, `separate` or `values` (a separator), `transfer` or `change` (an effect), `preprocess`, `evaluate`, `load`, `captures` or `export`"
 )
 
 
@@ -97,17 +97,17 @@ def own(plugin: Any) -> Own:
         raise TypeError(f"expected {_EXPECTED}, found {several}")
     method = found[0]
     # A formula and an effect are named in results.
-    name = getattr(plugin, "name", None if method in ("operator", "transfer") else _kebab(kind))
+    name = getattr(plugin, "name", None if method in ("operator", "transfer", "change") else _kebab(kind))
     if not isinstance(name, str) or not NAME.fullmatch(name):
         raise ValueError(f"{kind}: expected a `name` in kebab-case, as in \"half-the-sum\", found {name!r}")
     about = (inspect.getdoc(type(plugin)) or "").strip().partition("\n")[0] or "a plugin in Python"
-    columns, labels = (_names(plugin, key) if method == "values" else [] for key in ("columns", "labels"))
-    if method == "values" and not columns:
+    columns, labels = (_names(plugin, key) if method in ("values", "change") else [] for key in ("columns", "labels"))
+    if method in ("values", "change") and not columns:
         raise ValueError(f"{kind}: expected `columns`, names of the columns of numbers that it takes, as in [\"x_mm\"]")
     symbols = _symbols(plugin) if method in ("values", "evaluate") else []
     if method == "evaluate" and not symbols:
         raise ValueError(f"{kind}: expected `symbols`, pairs of symbol and unit of its values, as in [(\"lobing\", \"um\")]")
-    parameters = _parameters(plugin) if method == "transfer" else []
+    parameters = _parameters(plugin) if method in ("transfer", "change") else []
     return Own(name, about, method, parameters, columns, labels, symbols, plugin)
 
 
@@ -144,6 +144,8 @@ def _parameters(plugin: Any) -> list[tuple[str, str, float]]:
         raise ValueError(f"{kind}: expected `parameters` of (name, unit, usual size): {error}") from None
     if not parameters or not all(np.isfinite(size) and size > 0 for _, _, size in parameters):
         raise ValueError(f"{kind}: expected at least one parameter, with a usual size above 0, found {parameters}")
+    if not hasattr(plugin, "transfer"):
+        return parameters
     neutral = np.asarray(plugin.transfer(np.arange(3), *(0.0 for _ in parameters)))
     if neutral.shape != (3,) or not np.allclose(neutral, 1):
         raise ValueError(f"{kind}: expected a transfer of 1 at each order where all values are 0, found {neutral}")

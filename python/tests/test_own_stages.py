@@ -158,6 +158,45 @@ def test_a_separator_of_points_gives_what_the_program_of_its_class_gives(folder:
     assert abs(radius["value"] - 15) < 0.01 and radius["std"] < 0.01
 
 
+class WarmAir:
+    """Readings that follow the temperature of the air."""
+
+    name = "warm-air"
+    parameters = [("slope", "urad/K", 0.5)]
+    columns = ["temperature_k"]
+
+    def change(self, points: dict[str, Any], config: dict[str, Any]) -> dict[str, dict[str, Any]]:
+        return {"slope": {"slope_urad": points["temperature_k"] - 20}}
+
+
+def test_an_effect_of_points_is_found_and_taken_out(tmp_path: Path) -> None:
+    rng = np.random.default_rng(3)
+    rows = ["line,from_x_mm,from_y_mm,to_x_mm,to_y_mm,slope_urad,temperature_k"]
+    lines = {f"row {n}": lambda s, n=n: (s, n) for n in range(8)} | {f"column {n}": lambda s, n=n: (n, s) for n in range(8)}
+    lines |= {"rising": lambda s: (s, s), "falling": lambda s: (s, 7 - s)}
+    for name, place in lines.items():
+        for step in range(7):
+            (x0, y0), (x1, y1) = place(step), place(step + 1)
+            height = [2 * np.sin(x / 3) + y * y / 12 + 0.1 * x * y for x, y in ((x0, y0), (x1, y1))]
+            kelvin = 20 + np.sin(0.37 * len(rows))
+            tilt = 10 * (height[1] - height[0]) / np.hypot(x1 - x0, y1 - y0)
+            slope = tilt + 3 * (len(name) % 3) + 0.8 * (kelvin - 20) + 0.1 * rng.standard_normal()
+            rows.append(f"{name},{100 * x0},{100 * y0},{100 * x1},{100 * y1},{slope},{kelvin}")
+    (tmp_path / "plate.csv").write_text("\n".join(rows) + "\n")
+    (tmp_path / "plate.toml").write_text('load = { plugin = "points", path = "plate.csv" }\nseparate = { plugin = "flatness" }\n')
+    found = runout.diagnose(tmp_path / "plate.toml", plugins=[WarmAir()])
+    (added,) = found.added
+    (slope,) = added.parameters
+    assert added.effect == "warm-air" and slope.std is not None and abs(slope.value - 0.8) < 4 * slope.std < 0.3
+
+    class Short(WarmAir):
+        def change(self, points: dict[str, Any], config: dict[str, Any]) -> dict[str, dict[str, Any]]:
+            return {"slope": {"slope_urad": points["temperature_k"][1:]}}
+
+    with pytest.raises(ValueError, match=r"expected one number a point, 126, of `slope_urad`, found the shape \(125,\)"):
+        runout.diagnose(tmp_path / "plate.toml", plugins=[Short()])
+
+
 class Lobes:
     """The largest harmonic of each section's form, and its order."""
 

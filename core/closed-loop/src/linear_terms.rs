@@ -158,6 +158,33 @@ impl LinearTerms {
         })))
     }
 
+    /// Adds an effect that is known by what it does to the readings: of each parameter a step, and the models of the readings with half of it
+    /// taken away and added.
+    ///
+    /// # Errors
+    /// When these models have other observations.
+    pub fn adding(mut self, effect: Effect, steps: &[(f64, [Self; 2])]) -> Result<Self> {
+        let data = Arc::make_mut(&mut self.0);
+        let alike = |other: &Self| other.0.places == data.places && other.0.unseen.len() == data.unseen.len();
+        if !steps.iter().flat_map(|(_, models)| models).all(alike) {
+            let problem = "a thousandth of its usual size decides which readings are used";
+            return Err(Error::new("fit", effect.name(), problem).of(ErrorKind::UnsuitableData));
+        }
+        let column = |step: f64, [less, more]: [&Vec<f64>; 2]| -> Vec<f64> {
+            more.iter().zip(less).map(|(more, less)| (more - less) / step).collect()
+        };
+        let columns = |of: &dyn Fn(&Self) -> &Vec<f64>| -> Vec<Vec<f64>> {
+            steps.iter().map(|(step, [less, more])| column(*step, [of(less), of(more)])).collect()
+        };
+        let added = columns(&|model| &model.0.observations.values);
+        for (place, unseen) in data.unseen.iter_mut().enumerate() {
+            unseen.terms.push(columns(&|model| &model.0.unseen[place].values));
+        }
+        data.effects.push(effect.clone());
+        data.terms.push(Term { effect, columns: added, rank: 0 });
+        Ok(self)
+    }
+
     /// What was measured, in the order of the groups.
     #[must_use]
     pub fn observations(&self) -> &Observations {

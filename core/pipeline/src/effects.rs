@@ -2,7 +2,25 @@
 
 use std::{any::Any, sync::Arc};
 
-use runout_closed_loop::Parameter;
+use runout_closed_loop::{Effect, Parameter};
+use runout_error::Result;
+
+use crate::points::{Column, PointColumn, Points};
+
+/// An effect of a pipeline's own in measured points: something that adds to their readings.
+pub trait PointEffect: Send + Sync {
+    /// Its id and its parameters: where all are 0, it adds nothing.
+    fn effect(&self) -> Effect;
+
+    /// The columns that it takes of the points.
+    fn columns(&self) -> Vec<PointColumn>;
+
+    /// What one unit of each parameter adds to readings, `[parameter]`: columns of the points by their names, in their units.
+    ///
+    /// # Errors
+    /// When that is not known for these points.
+    fn partials(&self, points: &Points) -> Result<Vec<Vec<Column>>>;
+}
 
 /// Every effect, whatever it acts on.
 ///
@@ -35,6 +53,12 @@ impl EffectEntry {
         effect: E,
     ) -> Self {
         Self { name, about, parameters, effect: Arc::new(effect) }
+    }
+
+    /// Whether it is an effect of the domain whose effects are of type `E`.
+    #[must_use]
+    pub fn is<E: Any>(&self) -> bool {
+        self.effect.is::<E>()
     }
 }
 

@@ -3,6 +3,7 @@
 use std::{path::PathBuf, sync::Arc};
 
 use runout_core::{
+    closed_loop::Parameter,
     fault::Fault,
     pipeline::{Context, Plugin, Registry},
 };
@@ -12,7 +13,9 @@ use serde_json::{Map, Value};
 
 use crate::{
     config::{self, Gives},
+    point_effect::of_points,
     responder::Code,
+    session::Session,
     values::Symbol,
 };
 
@@ -29,6 +32,15 @@ pub enum CodeKind {
         labels: Vec<String>,
         /// Values that limits may name; nothing else is given where there are some.
         symbols: Vec<Symbol>,
+    },
+    /// It is an effect of points with these parameters, at least one, and takes these columns.
+    Effect {
+        /// What it is described by.
+        parameters: Vec<Parameter>,
+        /// Of numbers, at least one.
+        columns: Vec<String>,
+        /// Of texts.
+        labels: Vec<String>,
     },
     /// It changes averages.
     Preprocessor,
@@ -72,13 +84,20 @@ struct ExporterKeys {
 }
 
 /// Registers code under its name, which lasts as long as the process, as one line about it does.
+///
+/// # Errors
+/// When an effect has no columns of numbers, or one twice.
 pub fn register_code(
     registry: &mut Registry,
     (name, about): (&'static str, &'static str),
     kind: CodeKind,
     code: Arc<dyn Code>,
-) {
+) -> Result<(), Fault> {
     match kind {
+        CodeKind::Effect { parameters, columns, labels } => {
+            let (session, config) = (Session::new(code), Value::Object(Map::new()));
+            registry.effects.add(of_points(session, config, (name, about), parameters, [&columns, &labels])?);
+        }
         CodeKind::Turns => registry.separators.add(Plugin::made(name, about, move |keys: Keys, context| {
             config::turns(Arc::clone(&code).into(), Value::Object(keys.config), context)
         })),
@@ -110,6 +129,7 @@ pub fn register_code(
             }));
         }
     }
+    Ok(())
 }
 
 /// A fault of what the object says of itself: it has no key in the file.

@@ -1,6 +1,6 @@
 //! An effect: the orders and the values of its parameters out, reading over displacement of a channel in.
 
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 use runout_core::{
     Complex64, Error, Result,
@@ -19,6 +19,7 @@ use crate::{
     answer::Answer,
     config::with_program,
     frame::Frame,
+    point_effect::of_points,
     session::Session,
     tables::{Table, encode},
     values::lasting,
@@ -38,6 +39,12 @@ with_program! {
         pub about: Option<String>,
         /// Its parameters, at least one: where all are 0, it changes nothing.
         pub parameters: Vec<EffectParameter>,
+        /// Columns of numbers that the program takes of measured points; without it, it changes a channel of turns.
+        #[serde(default)]
+        pub columns: Option<Vec<String>>,
+        /// Columns of texts that it takes of measured points.
+        #[serde(default)]
+        pub labels: Vec<String>,
     }
 }
 
@@ -57,7 +64,8 @@ impl StageConfig for ExternalEffectConfig {
     type Stage = EffectEntry;
 
     const NAME: &'static str = "external";
-    const ABOUT: &'static str = "a linear change of one channel by a program in any language";
+    const ABOUT: &'static str =
+        "a linear change of one channel, or of readings at points, by a program in any language";
 
     fn check(self, context: &Context) -> std::result::Result<EffectEntry, Fault> {
         let is_word =
@@ -69,34 +77,53 @@ impl StageConfig for ExternalEffectConfig {
             );
             return Err(fault.help("id = \"ac-coupling\""));
         }
-        if self.parameters.is_empty() {
-            let fault = Fault::at("parameters", "expected at least one parameter, found none");
-            return Err(fault.help("parameters = [{ name = \"cut-off\", unit = \"1/rev\", usual = 0.1 }]"));
-        }
-        for (index, one) in self.parameters.iter().enumerate() {
-            let place = |fault: Fault| fault.under_item("parameters", index);
-            if one.name.is_empty() || self.parameters[..index].iter().any(|other| other.name == one.name) {
-                let problem = format!("names of parameters must differ and not be empty, found `{}`", one.name);
-                return Err(place(Fault::at("name", problem)));
+        let parameters = parameters(&self.parameters)?;
+        let session = Session::new(self.program(context)?);
+        let (id, config) = (lasting(&self.id), Value::Object(self.config));
+        let about = lasting(self.about.as_deref().unwrap_or("an effect of the pipeline's own"));
+        match &self.columns {
+            Some(columns) => of_points(session, config, (id, about), parameters, [columns, &self.labels]),
+            None if !self.labels.is_empty() => {
+                Err(Fault::at("labels", "turns have no columns").help("measured points need `columns` too"))
             }
-            if !(one.usual > 0.0 && one.usual.is_finite()) {
-                return Err(place(Fault::at("usual", format!("expected a number above 0, found {}", one.usual))));
+            None => {
+                let transfer = ExternalTransfer {
+                    session,
+                    config,
+                    names: parameters.iter().map(|one| one.name.clone()).collect(),
+                    object: format!("the effect {id}"),
+                    neutral: OnceLock::new(),
+                };
+                Ok(entry(Arc::new(ChannelEffect::new(id, about, parameters, transfer))))
             }
         }
-        let program = self.program(context)?;
-        let transfer = ExternalTransfer {
-            session: Session::new(program),
-            config: Value::Object(self.config),
-            names: self.parameters.iter().map(|one| one.name.clone()).collect(),
-            object: format!("the effect {}", self.id),
-            neutral: OnceLock::new(),
-        };
-        let parameter = |one: EffectParameter| Parameter { name: one.name, unit: one.unit, tolerance: one.usual };
-        let parameters = self.parameters.into_iter().map(parameter).collect();
-        let about = self.about.as_deref().unwrap_or("an effect of the pipeline's own");
-        let effect = ChannelEffect::new(lasting(&self.id), lasting(about), parameters, transfer);
-        Ok(entry(std::sync::Arc::new(effect)))
     }
+}
+
+/// Parameters as an effect has them.
+///
+/// # Errors
+/// When there are none, two have one name, or one has no usual size.
+fn parameters(declared: &[EffectParameter]) -> std::result::Result<Vec<Parameter>, Fault> {
+    if declared.is_empty() {
+        let fault = Fault::at("parameters", "expected at least one parameter, found none");
+        return Err(fault.help("parameters = [{ name = \"cut-off\", unit = \"1/rev\", usual = 0.1 }]"));
+    }
+    for (index, one) in declared.iter().enumerate() {
+        let place = |fault: Fault| fault.under_item("parameters", index);
+        if one.name.is_empty() || declared[..index].iter().any(|other| other.name == one.name) {
+            let problem = format!("names of parameters must differ and not be empty, found `{}`", one.name);
+            return Err(place(Fault::at("name", problem)));
+        }
+        if !(one.usual > 0.0 && one.usual.is_finite()) {
+            return Err(place(Fault::at("usual", format!("expected a number above 0, found {}", one.usual))));
+        }
+    }
+    let parameter = |one: &EffectParameter| {
+        let EffectParameter { name, unit, usual } = one.clone();
+        Parameter { name, unit, tolerance: usual }
+    };
+    Ok(declared.iter().map(parameter).collect())
 }
 
 /// A transfer that a program computes.

@@ -13,6 +13,7 @@ mod evaluator;
 mod exporter;
 mod frame;
 mod loader;
+mod point_effect;
 mod points;
 mod process;
 mod program;

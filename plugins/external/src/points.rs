@@ -42,46 +42,7 @@ impl ExternalPointSeparator {
         [numbers, labels]: [&[String]; 2],
         symbols: Symbols,
     ) -> std::result::Result<Self, Fault> {
-        if numbers.is_empty() {
-            return Err(Fault::at("columns", "expected at least one column of numbers").help("columns = [\"x_mm\"]"));
-        }
-        let mut known = HashSet::new();
-        let kinds = [("columns", PointKind::Number, numbers), ("labels", PointKind::Label, labels)];
-        let mut columns = Vec::new();
-        for (key, kind, names) in kinds {
-            for name in names {
-                if name.is_empty() || !known.insert(name) {
-                    let problem = format!("names of columns must differ and not be empty, found `{name}`");
-                    return Err(Fault::at(key, problem));
-                }
-                let unit = name.rsplit_once('_').and_then(|(_, end)| UNITS.into_iter().find(|unit| *unit == end));
-                let about = "for the program";
-                columns.push(PointColumn::needed(lasting(name), kind, unit.unwrap_or(""), about));
-            }
-        }
-        Ok(Self { session, config, columns, symbols })
-    }
-
-    fn request(&self, points: &Points) -> Result<Vec<u8>> {
-        let (mut specs, mut cells): (Vec<ColumnSpec>, Vec<ArrayRef>) = (Vec::new(), Vec::new());
-        for column in &self.columns {
-            if column.kind == PointKind::Label {
-                specs.push(ColumnSpec::name(column.name, column.about));
-                let labels = points.labels(column.name);
-                cells.push(texts(labels.ok_or_else(|| Error::new("find the column", column.name, "there is none"))?));
-            } else {
-                specs.push(ColumnSpec::number(column.name, column.unit, column.about));
-                cells.push(numbers(points.column(column.name)?.iter().copied()));
-            }
-        }
-        let spec = TableSpec::new("points", "measured points, in the order of the file", specs);
-        let about = [("stage", "separate-points".to_owned()), ("config", self.config.to_string())];
-        let frame = encode(&spec.name, &spec.rows(cells)?, &about);
-        let frame = frame.map_err(|error| Error::caused("write", "the table points", error))?;
-        let mut request = Vec::new();
-        frame.append_to(&mut request);
-        Frame::end().append_to(&mut request);
-        Ok(request)
+        Ok(Self { session, config, columns: columns([numbers, labels])?, symbols })
     }
 }
 
@@ -105,9 +66,63 @@ impl PointSeparator for ExternalPointSeparator {
     fn separate(&self, points: &Points) -> Result<Outcome> {
         let object = points.input.display().to_string();
         let count = points.columns.first().map_or(0, |column| column.values.len());
-        self.session
-            .answer(("separate", &object), self.request(points)?, |answer| outcome(answer, count, &self.symbols))
+        self.session.answer(
+            ("separate", &object),
+            request(points, &self.columns, "separate-points", &self.config)?,
+            |answer| outcome(answer, count, &self.symbols),
+        )
     }
+}
+
+/// Columns of numbers and of texts that a program takes of points.
+///
+/// # Errors
+/// When there are no numbers, or a name is there twice.
+pub(crate) fn columns([numbers, labels]: [&[String]; 2]) -> std::result::Result<Vec<PointColumn>, Fault> {
+    if numbers.is_empty() {
+        return Err(Fault::at("columns", "expected at least one column of numbers").help("columns = [\"x_mm\"]"));
+    }
+    let mut known = HashSet::new();
+    let kinds = [("columns", PointKind::Number, numbers), ("labels", PointKind::Label, labels)];
+    let mut columns = Vec::new();
+    for (key, kind, names) in kinds {
+        for name in names {
+            if name.is_empty() || !known.insert(name) {
+                let problem = format!("names of columns must differ and not be empty, found `{name}`");
+                return Err(Fault::at(key, problem));
+            }
+            let unit = name.rsplit_once('_').and_then(|(_, end)| UNITS.into_iter().find(|unit| *unit == end));
+            let about = "for the program";
+            columns.push(PointColumn::needed(lasting(name), kind, unit.unwrap_or(""), about));
+        }
+    }
+    Ok(columns)
+}
+
+/// The request of a stage that takes points.
+///
+/// # Errors
+/// When the points lack a column.
+pub(crate) fn request(points: &Points, columns: &[PointColumn], stage: &str, config: &Json) -> Result<Vec<u8>> {
+    let (mut specs, mut cells): (Vec<ColumnSpec>, Vec<ArrayRef>) = (Vec::new(), Vec::new());
+    for column in columns {
+        if column.kind == PointKind::Label {
+            specs.push(ColumnSpec::name(column.name, column.about));
+            let labels = points.labels(column.name);
+            cells.push(texts(labels.ok_or_else(|| Error::new("find the column", column.name, "there is none"))?));
+        } else {
+            specs.push(ColumnSpec::number(column.name, column.unit, column.about));
+            cells.push(numbers(points.column(column.name)?.iter().copied()));
+        }
+    }
+    let spec = TableSpec::new("points", "measured points, in the order of the file", specs);
+    let about = [("stage", stage.to_owned()), ("config", config.to_string())];
+    let frame = encode(&spec.name, &spec.rows(cells)?, &about);
+    let frame = frame.map_err(|error| Error::caused("write", "the table points", error))?;
+    let mut request = Vec::new();
+    frame.append_to(&mut request);
+    Frame::end().append_to(&mut request);
+    Ok(request)
 }
 
 /// What an answer says of so many points.

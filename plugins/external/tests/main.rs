@@ -8,6 +8,7 @@ mod evaluator;
 mod exporter;
 mod hostile;
 mod loader;
+mod point_effect;
 mod points;
 mod recording;
 mod support;

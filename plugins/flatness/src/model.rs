@@ -13,7 +13,7 @@ use runout_core::{
     consistency::{Kind, Structure},
     draws::{Draw, MeasuredAgain, Truth, measured_again, seed, without_noise},
     fault::Fault,
-    numerics::least_squares::{Basis, dot},
+    numerics::least_squares::dot,
     pipeline::{Context, StageConfig},
     points::{
         PointColumn,
@@ -176,10 +176,9 @@ impl LinearModel for Flatness {
 
     fn outcome(&self, points: &Points, fit: &LinearFit) -> Result<Outcome> {
         let steps = Steps::of(points)?;
-        let (free, declared) = declared(&steps, steps.datum(points)?);
-        // Heights beside a drift that is fitted are less certain.
-        let drifts = fit.effects().filter(|(effect, ..)| !fit.knows(&effect.id)).map(|_| steps.drift());
-        let readings = Basis::of(declared.into_iter().map(|one| one.column).chain(drifts).collect());
+        let (free, _) = declared(&steps, steps.datum(points)?);
+        // Heights beside an effect that is fitted are less certain.
+        let readings = fit.basis();
         let plane = plane(&steps.nodes_mm);
         let heights = |parameters: &[f64]| {
             let mut heights_um = vec![0.0; steps.nodes_mm.len()];
@@ -197,11 +196,12 @@ impl LinearModel for Flatness {
             Some(stated) if stated >= found_urad => (wider * stated, 0),
             _ => (wider * found_urad, dof),
         };
-        // What one reading does to the heights, `[reading][node]`.
+        // What one reading does to the heights, in the order of the file, `[reading][node]`.
         let weights = readings.weights();
-        let influence: Vec<Vec<f64>> = (0..left.len())
-            .map(|reading| heights(&weights.iter().map(|of| of[reading]).collect::<Vec<f64>>()))
-            .collect();
+        let mut order: Vec<usize> = (0..left.len()).collect();
+        order.sort_unstable_by_key(|reading| fit.places()[*reading]);
+        let of_reading = |reading: usize| weights.iter().map(|of| of[reading]).collect::<Vec<f64>>();
+        let influence: Vec<Vec<f64>> = order.into_iter().map(|reading| heights(&of_reading(reading))).collect();
         let variance: Vec<f64> = (0..heights_um.len())
             .map(|node| influence.iter().map(|of| (std_urad * of[node]).powi(2)).sum::<f64>())
             .collect();

@@ -38,7 +38,7 @@ use separator::OwnSeparator;
 pub(crate) struct Own {
     name: String,
     about: String,
-    /// The method that says what it is: "operator", "transfer", "preprocess", "separate", "values", "load", "captures", "evaluate" or "export".
+    /// The method that says what it is: "operator", "transfer", "change", "preprocess", "separate", "values", "load", "captures", "evaluate" or "export".
     method: String,
     /// Name, unit and tolerance of each parameter of an effect.
     parameters: Vec<(String, String, f64)>,
@@ -64,18 +64,19 @@ pub(crate) fn register(registry: &mut Registry, plugins: Vec<Own>, stop: &Stop) 
         let (name, about) = (lasting(&name), lasting(&about));
         let object = Arc::new(Object { name, plugin, stop: stop.clone(), raised: AtomicBool::new(false) });
         let symbols = symbols.into_iter().map(|(symbol, unit)| Symbol { symbol, unit }).collect();
+        let parameter = |(name, unit, tolerance)| Parameter { name, unit, tolerance };
+        let parameters = parameters.into_iter().map(parameter).collect();
         let kind = match &*method {
             "operator" => {
                 registry.separators.add(formula(about, object));
                 continue;
             }
             "transfer" => {
-                let parameter = |(name, unit, tolerance)| Parameter { name, unit, tolerance };
-                let parameters = parameters.into_iter().map(parameter).collect();
                 let effect = ChannelEffect::new(name, about, parameters, OwnTransfer(object));
                 registry.effects.add(effects::entry(Arc::new(effect)));
                 continue;
             }
+            "change" => CodeKind::Effect { parameters, columns, labels },
             "values" => CodeKind::Points { columns, labels, symbols },
             "preprocess" => CodeKind::Preprocessor,
             "load" => CodeKind::Loader(Gives::Points),
@@ -84,7 +85,10 @@ pub(crate) fn register(registry: &mut Registry, plugins: Vec<Own>, stop: &Stop) 
             "export" => CodeKind::Exporter,
             _ => CodeKind::Turns,
         };
-        register_code(registry, (name, about), kind, Arc::new(OwnCode(object)));
+        register_code(registry, (name, about), kind, Arc::new(OwnCode(object))).map_err(|fault| Failure::Name {
+            message: format!("{name}: {}", fault.message),
+            help: "an effect of points takes `columns`, names of columns of numbers".into(),
+        })?;
     }
     Ok(())
 }
@@ -92,7 +96,7 @@ pub(crate) fn register(registry: &mut Registry, plugins: Vec<Own>, stop: &Stop) 
 /// Whether a plugin of the same stage has a name.
 fn is_taken(registry: &Registry, name: &str, method: &str) -> bool {
     match method {
-        "transfer" => registry.effects.iter().any(|known| known.name == name),
+        "transfer" | "change" => registry.effects.iter().any(|known| known.name == name),
         "preprocess" => registry.preprocessors.iter().any(|known| known.name == name),
         "load" | "captures" => registry.loaders.iter().any(|known| known.name == name),
         "evaluate" => registry.evaluators.iter().any(|known| known.name == name),

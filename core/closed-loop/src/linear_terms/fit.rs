@@ -114,6 +114,18 @@ impl LinearFit {
         self.judgement().factors.get(self.places_of(effect)).unwrap_or_default()
     }
 
+    /// Where each observation was in what the model was made of.
+    #[must_use]
+    pub fn places(&self) -> &[usize] {
+        &self.data.places
+    }
+
+    /// The span of everything that is fitted: of the declared parameters, then of the effects that are not known.
+    #[must_use]
+    pub fn basis(&self) -> &Basis {
+        &self.joint
+    }
+
     /// Declared parameters, in their order.
     #[must_use]
     pub fn declared(&self) -> &[f64] {

@@ -180,7 +180,8 @@ impl Pipeline {
                     let fault = Fault::span(table.span(), "measured points take no [rig]");
                     return Err(fault.help("leave it out; [separate] describes how points were measured"));
                 }
-                (route::points(registry.separators.build(&separate_table, &context)?, &separate_table, root)?, None)
+                let separator = registry.separators.build(&separate_table, &context)?;
+                (route::points(separator, &separate_table, root, &effects)?, None)
             }
         };
         let diagnose = table(root, "diagnose")?

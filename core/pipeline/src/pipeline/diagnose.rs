@@ -3,7 +3,7 @@
 mod corrected_rig;
 mod moved;
 
-use std::{num::NonZeroUsize, path::PathBuf};
+use std::{num::NonZeroUsize, path::PathBuf, sync::Arc};
 
 use corrected_rig::Change;
 
@@ -21,8 +21,9 @@ use super::{
 };
 use crate::{
     atomic_file::PendingFile,
+    effects::PointEffect,
     points::{Points, measured},
-    stage::{PointModel, PointSeparator, Source, Station, StationModel, StationSeparator},
+    stage::{PointModel, PointSeparator, Source, Station, StationModel, StationSeparator, diagnose_linear},
     summary::Summary,
 };
 use runout_closed_loop::{
@@ -73,9 +74,9 @@ fn loop_on(pipeline: &Pipeline, threads: Option<NonZeroUsize>, observer: &dyn Ob
             .of(ErrorKind::Configuration)
     };
     match (&source, &pipeline.route) {
-        (Source::Points(points), Route::Points { separator, .. }) => {
+        (Source::Points(points), Route::Points { separator, effects, .. }) => {
             let model = separator.model().ok_or_else(|| no_model(&pipeline.separator))?;
-            diagnose_points(pipeline, points, (&**separator, model), observer)
+            diagnose_points(pipeline, points, (&**separator, model, effects), observer)
         }
         (Source::Turns(recording), Route::Turns { conditioners, averager, separator, model: Some(model) }) => {
             let rig = pipeline.rig.as_ref().ok_or_else(|| no_model(&pipeline.separator))?;
@@ -218,12 +219,13 @@ const MOST_ADDED: usize = 40;
 fn diagnose_points(
     pipeline: &Pipeline,
     points: &Points,
-    (separator, model): (&dyn PointSeparator, &dyn PointModel),
+    (separator, model, own): (&dyn PointSeparator, &dyn PointModel, &[Arc<dyn PointEffect>]),
     observer: &dyn Observer,
 ) -> Result<Diagnosed> {
     spare_inputs(&pipeline.diagnosed_outputs(), &points.inputs())?;
     measured::refuse_impossible(points)?;
-    let effects = model.effects_of(points)?;
+    let mut effects = model.effects_of(points)?;
+    effects.extend(own.iter().map(|own| own.effect()));
     let settings = if model.points_name_targets() {
         let settings = pipeline.diagnose.settings_for(&effects);
         settings.map_err(|fault| Error::caused("diagnose", &pipeline.title, fault))?
@@ -231,7 +233,11 @@ fn diagnose_points(
         pipeline.diagnose.settings.clone()
     };
     let known = known(&effects, &settings.known, |_| Vec::new());
-    let mut found = model.diagnose(points, &Settings { max_added: MOST_ADDED, ..settings })?;
+    let settings = Settings { max_added: MOST_ADDED, ..settings };
+    let mut found = match model.linear().filter(|_| !own.is_empty()) {
+        Some(model) => diagnose_linear(model, points, own, &settings)?,
+        None => model.diagnose(points, &settings)?,
+    };
     let checks = measured::checks(points, &separator.columns());
     found.diagnosis.refute(&checks);
     found.after = found.after.tested(checks);

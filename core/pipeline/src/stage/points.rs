@@ -6,14 +6,14 @@ use crate::{
     summary::Value,
 };
 use runout_closed_loop::{
-    Effect, Fit, Model, Settings, diagnose,
+    Effect, Settings,
     diagnosis::{Diagnosis, LostOrders},
     linear_terms::{LinearFit, LinearTerms},
 };
 use runout_consistency::{Check, refuted_by};
 use runout_error::Result;
 use runout_numerics::number::significant;
-use runout_table::{ColumnSpec, Figure, Measure, TableRows, TableSpec, counts, numbers, texts};
+use runout_table::{TableRows, TableSpec};
 use runout_turning::surface::Surface;
 
 /// χ² per degree of freedom below which, and standard deviations of chance by which, a residual is far below its noise.
@@ -39,7 +39,7 @@ pub trait PointSeparator: Send + Sync {
     /// The columns that it needs of the points, and those that it can use.
     fn columns(&self) -> Vec<PointColumn>;
 
-    /// The tables of its result, but for those that follow from form and for the values. A linear model declares [`residual_table`] here.
+    /// The tables of its result, but for those that follow from form and for the values. A linear model declares [`residual_table`](super::residual_table) here.
     fn tables(&self) -> Vec<TableSpec>;
 
     /// What the points say.
@@ -122,6 +122,11 @@ pub trait PointModel: Send + Sync {
     /// When the points do not hold what the model needs.
     fn effects_of(&self, _points: &Points) -> Result<Vec<Effect>> {
         Ok(self.effects())
+    }
+
+    /// The linear model that it is, where it is one: effects of a pipeline's own can be added to it.
+    fn linear(&self) -> Option<&dyn LinearModel> {
+        None
     }
 
     /// Runs the loop; `settings` count effects as [`effects_of`](Self::effects_of) does.
@@ -218,84 +223,4 @@ pub trait LinearModel: Send + Sync {
     /// # Errors
     /// When the points do not hold what it needs.
     fn outcome(&self, points: &Points, fit: &LinearFit) -> Result<Outcome>;
-}
-
-impl<M: LinearModel> PointModel for M {
-    fn effects(&self) -> Vec<Effect> {
-        self.candidates()
-    }
-
-    fn diagnose(&self, points: &Points, settings: &Settings) -> Result<PointDiagnosis> {
-        let terms = self.terms(points)?.with_known(&settings.known).considering(settings.effects.as_deref());
-        let closed = diagnose(&terms, settings)?;
-        let mut after = self.outcome(points, &closed.after)?;
-        after.checks.extend(closed.diagnosis.consistency.iter().cloned());
-        after.tables.push(residual_rows(&terms, &closed.before, &closed.after)?);
-        after.remarks.extend(hardly_tested(&closed.before));
-        let mut diagnosis = closed.diagnosis;
-        diagnosis.warnings.append(&mut after.remarks);
-        Ok(PointDiagnosis { diagnosis, after: after.refuted() })
-    }
-}
-
-/// Degrees of freedom below which readings hardly test what is said of them.
-const FEW_FREEDOM: usize = 5;
-
-/// Says that hardly anything tests a fit; nothing where something does.
-fn hardly_tested(fit: &LinearFit) -> Option<String> {
-    let dof = fit.remainder().dof;
-    let degrees = if dof == 1 { "degree" } else { "degrees" };
-    (dof < FEW_FREEDOM).then(|| {
-        format!("{dof} {degrees} of freedom beside what is fitted hardly test it: a drift or an offset as large as the values would not be seen")
-    })
-}
-
-/// The result of a linear model as it is declared, with the rows of [`residual_table`], which the separator's `tables` must declare.
-///
-/// # Errors
-/// When the points do not hold what the model needs.
-pub fn separate_declared(model: &impl LinearModel, points: &Points) -> Result<Outcome> {
-    let terms = model.terms(points)?;
-    let fit = terms.fit(&[])?;
-    let mut outcome = model.outcome(points, &fit)?;
-    outcome.checks.extend(fit.consistency());
-    outcome.tables.push(residual_rows(&terms, &fit, &fit)?);
-    outcome.remarks.extend(hardly_tested(&fit));
-    Ok(outcome.refuted())
-}
-
-/// The residual of a linear model, reading by reading.
-#[must_use]
-pub fn residual_table(unit: &str) -> TableSpec {
-    let residual = |name: &str, of: &str| ColumnSpec::number(name, unit, format!("reading less {of}"));
-    TableSpec::new(
-        "residual",
-        "residual of each reading",
-        vec![
-            ColumnSpec::count("reading", "", "number of the reading, from 0"),
-            ColumnSpec::name("group", "what is held out together"),
-            ColumnSpec::number("value", unit, "the reading"),
-            residual("before", "the declared model"),
-            residual("after", "the final model; that of a run is the declared one"),
-        ],
-    )
-    .figure(Figure::lines("residual", "Residual", "reading", ["before", "after"].map(Measure::new)))
-}
-
-fn residual_rows(terms: &LinearTerms, before: &LinearFit, after: &LinearFit) -> Result<TableRows> {
-    let observations = terms.observations();
-    // Rows are in the order in which they were measured.
-    let mut order: Vec<usize> = (0..observations.values.len()).collect();
-    order.sort_unstable_by_key(|index| terms.places()[*index]);
-    let column = |values: &[f64]| numbers(order.iter().map(|index| values[*index]));
-    let groups = order.iter().map(|index| observations.group[*index]);
-    let spec = residual_table(&observations.unit);
-    let rows = spec.rows(vec![
-        counts(0..order.len()),
-        texts(groups.map(|group| observations.groups.get(group).map_or("", String::as_str))),
-        column(&observations.values),
-        column(&before.residual()),
-        column(&after.residual()),
-    ])?;
-    Ok(TableRows { table: spec.name, rows })
 }

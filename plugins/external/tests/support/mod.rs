@@ -73,6 +73,7 @@ pub(crate) fn registry() -> Registry {
     let mut registry = Registry::default();
     registry.loaders.add(Plugin::of::<Simulated>());
     runout_points::register(&mut registry);
+    runout_flatness::register(&mut registry);
     runout_preprocess::register(&mut registry);
     runout_spindle::register(&mut registry);
     runout_parquet::register(&mut registry);

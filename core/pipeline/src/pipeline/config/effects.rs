@@ -1,9 +1,11 @@
 //! `[[effect]]`: effects of the pipeline's own, beside those that are registered.
 
+use std::sync::Arc;
+
 use runout_error::fault::Fault;
 
 use crate::{
-    effects::EffectCatalogue,
+    effects::{EffectCatalogue, PointEffect},
     pipeline::{
         document::{self, Table, tables},
         registry::{Context, Registry},
@@ -20,16 +22,26 @@ pub(super) fn effects(
 ) -> Result<EffectCatalogue, Fault> {
     let mut effects = registry.effects.clone();
     for table in tables(root, "effect")? {
-        if kind == SourceKind::Points {
-            let fault = Fault::span(table.span(), "measured points take no [[effect]]: it changes a channel of turns");
-            return Err(fault.help("leave it out; their effects are those of the domain"));
-        }
         let effect = registry.own_effects.build(&table, context)?;
         if effects.iter().any(|known| known.name == effect.name) {
             let fault = Fault::at("id", format!("there is an effect `{}` already", effect.name));
             return Err(document::resolve(fault.help("give it another id"), &table));
         }
-        effects.add(effect);
+        let refused = match (kind, effect.is::<Arc<dyn PointEffect>>()) {
+            (SourceKind::Points, false) => Fault::span(
+                table.span(),
+                "it changes a channel of turns, and [load] gives measured points",
+            )
+            .help("columns = [\"x_mm\"], changes = [\"slope_urad\"]: what it takes of the points, and what it adds to"),
+            (SourceKind::Turns, true) => {
+                Fault::at("columns", "turns have no columns").help("leave `columns`, `labels` and `changes` out")
+            }
+            _ => {
+                effects.add(effect);
+                continue;
+            }
+        };
+        return Err(document::resolve(refused, &table));
     }
     Ok(effects)
 }

@@ -1,7 +1,9 @@
 //! The ways from a measurement to form, built from their stages.
 
+use std::sync::Arc;
+
 use crate::{
-    effects::EffectCatalogue,
+    effects::{EffectCatalogue, PointEffect},
     pipeline::{
         document::{self, Table, table},
         tables::{self, StationTables},
@@ -39,6 +41,8 @@ pub enum Route {
         separator: Box<dyn PointSeparator>,
         /// The columns that it takes.
         columns: Vec<PointColumn>,
+        /// Effects of the pipeline's own.
+        effects: Vec<Arc<dyn PointEffect>>,
     },
 }
 
@@ -87,7 +91,10 @@ impl Route {
     pub(super) fn effects(&self) -> Vec<Effect> {
         match self {
             Self::Turns { model, .. } => model.as_ref().map_or_else(Vec::new, |model| model.effects().to_vec()),
-            Self::Points { separator, .. } => separator.model().map_or_else(Vec::new, PointModel::effects),
+            Self::Points { separator, effects, .. } => {
+                let of_domain = separator.model().map_or_else(Vec::new, PointModel::effects);
+                of_domain.into_iter().chain(effects.iter().map(|own| own.effect())).collect()
+            }
         }
     }
 
@@ -121,14 +128,34 @@ impl Route {
 }
 
 /// The route of measured points.
-pub(super) fn points(separator: Separator, separate_table: &Table, root: &Table) -> Result<Route, Fault> {
+pub(super) fn points(
+    separator: Separator,
+    separate_table: &Table,
+    root: &Table,
+    effects: &EffectCatalogue,
+) -> Result<Route, Fault> {
     match separator {
-        Separator::Points(separator) => match table(root, "surface")? {
-            Some(table) if !separator.evaluables().contains(&EvaluableKind::ClosedProfiles) => {
-                Err(Fault::span(table.span(), "this separator gives no form: it makes no surface"))
+        Separator::Points(separator) => {
+            let gives_form = separator.evaluables().contains(&EvaluableKind::ClosedProfiles);
+            if let Some(table) = table(root, "surface")?.filter(|_| !gives_form) {
+                return Err(Fault::span(table.span(), "this separator gives no form: it makes no surface"));
             }
-            _ => Ok(Route::Points { columns: separator.columns(), separator }),
-        },
+            let effects = effects.of::<Arc<dyn PointEffect>>();
+            let is_linear = separator.model().is_some_and(|model| model.linear().is_some());
+            if let Some(own) = effects.first().filter(|_| !is_linear) {
+                let problem = format!("its model takes no effect of a pipeline's own, as `{}` is", own.effect().id);
+                let fault = Fault::at("plugin", problem)
+                    .help("leave [[effect]] out; models that are linear take them: docs/external-programs.md");
+                return Err(document::resolve(fault, separate_table));
+            }
+            let mut columns = separator.columns();
+            for column in effects.iter().flat_map(|own| own.columns()) {
+                if columns.iter().all(|known| known.name != column.name) {
+                    columns.push(column);
+                }
+            }
+            Ok(Route::Points { separator, columns, effects })
+        }
         Separator::Stations(_) => {
             let fault = Fault::at("plugin", "this separator takes recorded turns; [load] gives points");
             Err(document::resolve(fault, separate_table))
