@@ -345,6 +345,9 @@ pub(crate) struct ConvertArgs {
     /// Distance of columns (and rows) of a matrix as text, in mm.
     #[arg(long, value_name = "MM", num_args = 1..=2)]
     pub step_mm: Vec<f64>,
+    /// Write over a file that is there.
+    #[arg(long)]
+    pub overwrite: bool,
 }
 
 /// `runout report`.

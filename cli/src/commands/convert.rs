@@ -3,7 +3,7 @@
 use runout_core::{Error, ErrorKind, length_unit::micrometres};
 use runout_maps::{Map, Wanted, read, write};
 
-use super::print;
+use super::{print, there_already};
 use crate::{
     args::ConvertArgs,
     failure::Failure,
@@ -16,6 +16,9 @@ use crate::{
 /// # Errors
 /// When the file cannot be read or written.
 pub(crate) fn execute(args: &ConvertArgs, json: bool) -> Result<(), Failure> {
+    if !args.overwrite && std::fs::symlink_metadata(&args.output).is_ok() {
+        return Err(there_already(&args.output, "name another file, or add --overwrite"));
+    }
     print(&report(args)?, json, render::file::converted)
 }
 

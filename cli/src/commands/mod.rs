@@ -17,6 +17,8 @@ pub(crate) mod run;
 pub(crate) mod schema;
 pub(crate) mod simulate;
 
+use std::path::Path;
+
 use runout_core::pipeline::{INCLUDE_KEY, Pipeline, Registry, document::Sources};
 use serde::Serialize;
 
@@ -78,4 +80,9 @@ fn fail_on(warnings: usize, args: WarningArgs) -> Result<(), Failure> {
 fn print<T: Serialize>(result: &T, json: bool, text: impl FnOnce(&T) -> String) -> Result<(), Failure> {
     let outcome = if json { render::document(result) } else { render::to_stdout(&text(result)) };
     Ok(outcome?)
+}
+
+/// A file that a command would write over.
+fn there_already(file: &Path, help: &str) -> Failure {
+    Failure::Name { message: format!("`{}` is there already", file.display()), help: help.into() }
 }

@@ -15,7 +15,7 @@ use runout_core::{
 use runout_hdf5::MEASUREMENT_FORMAT;
 use serde::Serialize;
 
-use super::print;
+use super::{print, there_already};
 use crate::{args::NewArgs, failure::Failure, templates::TEMPLATES};
 
 /// What was written.
@@ -37,8 +37,7 @@ pub(crate) fn execute(args: &NewArgs, json: bool, registry: &Registry) -> Result
     let template = template(&args.method, registry)?;
     let output = args.out.clone().unwrap_or_else(|| format!("{}.toml", args.method).into());
     if !args.overwrite && fs::symlink_metadata(&output).is_ok() {
-        let message = format!("`{}` is there already", output.display());
-        return Err(Failure::Name { message, help: "name another file by --out, or add --overwrite".into() });
+        return Err(there_already(&output, "name another file by --out, or add --overwrite"));
     }
     let folder = output.parent().unwrap_or(Path::new("")).to_owned();
     let checked = |text: &str| {

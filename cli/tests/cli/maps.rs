@@ -31,13 +31,16 @@ fn a_map_is_written_in_another_format() {
         let ran = folder.run(&["convert", &data("objects.sur"), name, "--layer", "right"]);
         assert_eq!(ran.status, 0, "{}", ran.stderr);
         assert!(ran.stdout.contains("the other maps of the file: it has left, right"), "{}", ran.stdout);
-        let again = folder.run(&["convert", name, "again.x3p", "--json"]);
+        let again = folder.run(&["convert", name, "again.x3p", "--json", "--overwrite"]);
         let document: Value = serde_json::from_str(&again.stdout).unwrap();
         assert_eq!(document["input"]["voids"], 2, "{name}");
     }
+    let ran = folder.run(&["convert", &data("plain.sur"), "map.h5"]);
+    assert_ne!(ran.status, 0);
+    assert!(ran.stderr.contains("`map.h5` is there already") && ran.stderr.contains("--overwrite"), "{}", ran.stderr);
     let ran = folder.run(&["convert", &data("plain.sur"), "map.tif"]);
     assert_eq!(ran.status, 1);
     assert!(ran.stderr.contains("none of the formats that maps are written as"), "{}", ran.stderr);
-    let ran = folder.run(&["convert", &data("bits16.sur"), "map.x3p", "--unit", "volt"]);
+    let ran = folder.run(&["convert", &data("bits16.sur"), "other.x3p", "--unit", "volt"]);
     assert!(ran.stderr.contains("`volt` is no unit of length"), "{}", ran.stderr);
 }
