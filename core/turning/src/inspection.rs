@@ -18,14 +18,17 @@
 //!   may truly stand so long (a sine of amplitude 3.4 steps does, at its crest), so that a channel is not judged while
 //!   its swing so far is at most [`STUCK_STEPS`] of its finest steps, unless it has not moved at all.
 //! - A channel that never moves is an error at the end of the stream.
+//! - A channel whose readings stand for several samples each is handed on, and reported.
 //! - A reading far from what the channel reads in all other turns may be a disturbance, or what the part and the spindle did:
 //!   it is handed on, and [reported](Inspection::reporting).
 
 mod channel;
+mod held;
 mod rule;
 mod spikes;
 
 use channel::{Channel, Look};
+pub use held::Held;
 use rule::Rule;
 pub use spikes::Spike;
 
@@ -74,13 +77,24 @@ pub struct Inspection<'a> {
     /// Frames that are looked over at once.
     chunk: usize,
     ended: bool,
-    report: Option<Box<dyn FnOnce(Vec<Spike>) + Send + 'a>>,
+    /// Channels whose readings stand for several samples, once the first frames were looked at.
+    several: Option<Vec<Held>>,
+    report: Option<Box<dyn FnOnce(Unusual) + Send + 'a>>,
+}
+
+/// What is unusual in a capture, and handed on.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Unusual {
+    /// Readings far from all others.
+    pub spikes: Vec<Spike>,
+    /// Channels whose readings stand for several samples each.
+    pub held: Vec<Held>,
 }
 
 impl<'a> Inspection<'a> {
-    /// Wraps a loader's stream; at its end `report` gets what is far from all other readings.
+    /// Wraps a loader's stream; at its end `report` gets what is unusual.
     #[must_use]
-    pub fn reporting(input: Box<dyn SampleStream + 'a>, report: impl FnOnce(Vec<Spike>) + Send + 'a) -> Self {
+    pub fn reporting(input: Box<dyn SampleStream + 'a>, report: impl FnOnce(Unusual) + Send + 'a) -> Self {
         Self { report: Some(Box::new(report)), ..Self::new(input) }
     }
 
@@ -103,7 +117,7 @@ impl<'a> Inspection<'a> {
         let channels = vec![Channel::new(turn); count];
         let chunk = turn.map_or(CHUNK[1], |turn| (turn.ceil() as usize).clamp(CHUNK[0], CHUNK[1]));
         let (raw, held, past) = (Block::default(), Block::default(), Vec::new());
-        Self { input, raw, held, past, channels, rule, stuck, chunk, ended: false, report: None }
+        Self { input, raw, held, past, channels, rule, stuck, chunk, ended: false, several: None, report: None }
     }
 
     /// Looks at the block in `raw` and joins it to those held.
@@ -119,6 +133,9 @@ impl<'a> Inspection<'a> {
             self.held.samples.append(&mut self.raw.samples);
             self.held.angle_rev.append(&mut self.raw.angle_rev);
             self.held.defects.append(&mut self.raw.defects);
+        }
+        if self.several.is_none() && self.held.samples.len() >= held::FRAMES[0] * count {
+            self.several = Some(held::held(&self.held.samples, count));
         }
         let mut from = first;
         while from < self.held.samples.len() {
@@ -214,7 +231,8 @@ impl SampleStream for Inspection<'_> {
                 self.alive()?;
                 if let Some(report) = self.report.take() {
                     let spike = |(index, channel): (usize, &Channel)| channel.spike(index);
-                    report(self.channels.iter().enumerate().filter_map(spike).collect());
+                    let spikes = self.channels.iter().enumerate().filter_map(spike).collect();
+                    report(Unusual { spikes, held: self.several.take().unwrap_or_default() });
                 }
             }
         }

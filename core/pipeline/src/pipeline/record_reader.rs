@@ -17,14 +17,14 @@ use super::{
 };
 use crate::stage::{AverageRequest, Averager, Conditioner, Station, StationSeparator};
 use runout_closed_loop::Settings;
-use runout_consistency::turns::PhaseCourse;
+use runout_consistency::{Check, Test, turns::PhaseCourse};
 use runout_error::{Error, ErrorKind, Result};
 use runout_numerics::{number::significant, threads};
 use runout_turning::{
     calibrated::calibrated,
     counted_turns,
     input_file::InputFile,
-    inspection::{Inspection, Spike},
+    inspection::{Held, Inspection, Spike, Unusual},
     measurement::{Capture, Recording, SampleStream, StationKey},
     profile::{Profile, RejectedTurn},
     provenance::Input,
@@ -78,8 +78,8 @@ impl RecordReader<'_> {
             Ok(())
         });
         let setups = self.rig.setups.len();
-        // What is far from all other readings of a capture, `[station][setup]`.
-        let spikes: Vec<Mutex<Vec<Spike>>> = (0..stations.len() * setups).map(|_| Mutex::default()).collect();
+        // What is unusual in a capture, `[station][setup]`.
+        let unusual: Vec<Mutex<Unusual>> = (0..stations.len() * setups).map(|_| Mutex::default()).collect();
         let worker = || {
             let claimed = std::iter::from_fn(|| {
                 let more = !failed.load(Ordering::Relaxed);
@@ -87,14 +87,14 @@ impl RecordReader<'_> {
             });
             let captures =
                 claimed.flat_map(|station| (0..setups).map(move |setup| (station, setup))).map(|(station, setup)| {
-                    let spikes = &spikes[station * setups + setup];
-                    (station, self.recorded(readers, station, setup, &[], spikes))
+                    let unusual = &unusual[station * setups + setup];
+                    (station, self.recorded(readers, station, setup, &[], unusual))
                 });
             let average = |captures: &mut dyn Captures<usize>,
                            hand_on: &mut dyn FnMut((usize, Result<Station>)) -> bool| {
                 while let Some(index) = captures.coming() {
-                    let spikes = &spikes[index * setups..(index + 1) * setups];
-                    if !hand_on((index, self.station((index, &stations[index]), captures, spikes))) {
+                    let unusual = &unusual[index * setups..(index + 1) * setups];
+                    if !hand_on((index, self.station((index, &stations[index]), captures, unusual))) {
                         break;
                     }
                 }
@@ -147,12 +147,12 @@ impl RecordReader<'_> {
         station: usize,
         setup: usize,
         counted_by: &[PhaseCourse],
-        spikes: &'b Mutex<Vec<Spike>>,
+        unusual: &'b Mutex<Unusual>,
     ) -> Result<Box<dyn SampleStream + 'b>> {
         let opened = calibrated(self.recording.open_with(threads, station, setup)?, self.rig);
         let opened = counted_turns::declared(opened, self.rig.setups[setup].turns_per_mark);
         let opened = counted_by.iter().fold(opened, counted_turns::counted);
-        let report = |found| *spikes.lock().unwrap_or_else(PoisonError::into_inner) = found;
+        let report = |found| *unusual.lock().unwrap_or_else(PoisonError::into_inner) = found;
         let inspected: Box<dyn SampleStream + '_> = Box::new(Inspection::reporting(opened, report));
         self.conditioners.iter().try_fold(inspected, |stream, conditioner| conditioner.attach(stream))
     }
@@ -162,10 +162,10 @@ impl RecordReader<'_> {
         &self,
         (index, key): (usize, &StationKey),
         captures: &mut dyn Captures<usize>,
-        spikes: &[Mutex<Vec<Spike>>],
+        unusual: &[Mutex<Unusual>],
     ) -> Result<Station> {
         let mut profiles = Ok(Vec::with_capacity(self.rig.setups.len()));
-        for (setup, spikes) in spikes.iter().enumerate() {
+        for (setup, unusual) in unusual.iter().enumerate() {
             let capture = captures.open();
             let projection = self.projections.get(setup).and_then(Option::as_ref);
             let wanted = AverageRequest { hold_out: self.hold_out, projection };
@@ -173,13 +173,15 @@ impl RecordReader<'_> {
                 let stream = capture?;
                 let capture = stream.capture().clone();
                 let mut profile = self.averager.average_requested(stream, wanted)?;
-                let spikes = std::mem::take(&mut *spikes.lock().unwrap_or_else(PoisonError::into_inner));
-                profile.warnings.extend(unusual(&spikes, &capture, &profile));
+                let Unusual { spikes, held } =
+                    std::mem::take(&mut *unusual.lock().unwrap_or_else(PoisonError::into_inner));
+                profile.warnings.extend(far_from_others(&spikes, &capture, &profile));
+                profile.course.checks.extend(faster_than_sensors(&held, &capture));
                 if let Some(settings) = self.puts_right {
                     let is_wanted = |phase: &PhaseCourse| put_right::marks::is_wanted(phase, settings);
                     profile = put_right::marks::recounted(profile, is_wanted, |by| {
-                        let spikes = Mutex::default();
-                        let stream = self.recorded(NonZeroUsize::MIN, index, setup, by, &spikes)?;
+                        let unusual = Mutex::default();
+                        let stream = self.recorded(NonZeroUsize::MIN, index, setup, by, &unusual)?;
                         self.averager.average_requested(stream, wanted)
                     });
                 }
@@ -195,8 +197,23 @@ impl RecordReader<'_> {
     }
 }
 
+/// That readings stand for several samples: between them, angles go on and readings do not.
+fn faster_than_sensors(held: &[Held], capture: &Capture) -> Option<Check> {
+    let samples = held.iter().map(|one| one.samples).max()?;
+    let sensors: Vec<&str> =
+        held.iter().filter_map(|one| capture.sensor_ids.get(one.channel).map(String::as_str)).collect();
+    Some(Check::new(Test::Measured, sensors.join(", "), samples as f64, &[], 0.0).finding(|| {
+        format!(
+            "{}: each reading of {} stands for about {samples} samples: the recorder is faster than the sensor, and angles and readings do not \
+             belong together; record at the sensor's rate, or keep one sample of {samples}",
+            capture.object,
+            sensors.join(", ")
+        )
+    }))
+}
+
 /// Says which readings, far from all others, are in an average.
-fn unusual(spikes: &[Spike], capture: &Capture, profile: &Profile) -> Vec<String> {
+fn far_from_others(spikes: &[Spike], capture: &Capture, profile: &Profile) -> Vec<String> {
     let turn_samples = capture.median_turn_samples().unwrap_or(0.0);
     let left_out = |spike: &Spike| {
         let (sample, within) = (spike.near_sample as f64, spike.within_samples as f64);

@@ -231,7 +231,8 @@ fn a_slow_swing_of_few_steps_is_not_stuck() {
 /// What is reported at the end.
 fn spikes(stream: MemoryStream) -> Vec<Spike> {
     let (sender, reported) = std::sync::mpsc::channel();
-    let mut inspection = Inspection::reporting(Box::new(stream), move |spikes| sender.send(spikes).unwrap());
+    let mut inspection =
+        Inspection::reporting(Box::new(stream), move |found: Unusual| sender.send(found.spikes).unwrap());
     let mut block = Block::default();
     while inspection.next_block(&mut block).unwrap() {}
     drop(inspection);
