@@ -72,7 +72,9 @@ impl Solver<'_> {
             return Err(self.unsettled(station, &readings, &estimate));
         }
         let mut propagation = Propagation::of(&readings, &operators);
-        let (mut residual, factors) = judged_residual(&operators, &readings, &linear, propagation.as_ref());
+        let (mut residual, mut factors) = judged_residual(&operators, &readings, &linear, propagation.as_ref());
+        let coupled = self.coupled_noise(&readings, &operators, &estimate).unwrap_or_default();
+        factors.iter_mut().zip(coupled).for_each(|(factor, coupled)| *factor *= coupled);
         residual.by_reading = by_reading(&operators, &readings, &linear);
         if readings.has_more_than_noise() {
             readings.add_more_than_noise();

@@ -1,15 +1,79 @@
-//! What is said of a part that turns far off the axis.
+//! What is said of a part that turns far off the axis, and what it makes of noise.
 
-use runout_core::{Error, ErrorKind, numerics::number::significant, stage::Station};
+use std::f64::consts::FRAC_1_SQRT_2;
 
-use super::{Estimate, Readings, Solver};
+use runout_core::{
+    Complex64, Error, ErrorKind,
+    draws::{Draw, seed},
+    numerics::number::significant,
+    stage::Station,
+};
+
+use super::{Estimate, Operators, Readings, Solver};
 
 /// From this eccentricity on, as a share of the radius, stated uncertainties lack what badly determined orders carry into others.
 const LARGE: f64 = 0.015;
 /// No part is clamped so far off centre, as a share of its radius.
 pub(super) const FAR_OFF: f64 = 0.1;
 
+/// The highest order times eccentricity over radius from which on what orders carry into each other is a large part of them.
+const STRONG: f64 = 0.8;
+/// Draws of the readings' noise there, orders to each side that are taken together, and by how much more the variance is to be than order by order.
+const DRAWS: usize = 4;
+const ORDERS_BESIDE: usize = 2;
+const LARGER: f64 = 1.5;
+
 impl Solver<'_> {
+    /// By how much the variance of each order from 1 is larger than order by order, where the eccentricity couples the orders: noise is added to the
+    /// readings, they are solved again, and what changes is compared with what each order's own solution makes of that noise. `None` where orders
+    /// hardly couple, or the noise is not known.
+    pub(super) fn coupled_noise(
+        &self,
+        readings: &Readings,
+        operators: &Operators,
+        estimate: &Estimate,
+    ) -> Option<Vec<f64>> {
+        let share = self.eccentricity_um(readings) / (1e3 * self.selection.rig.part_radius_mm);
+        let setups = readings.covariance.as_ref()?;
+        if !self.second_order || share * (readings.max_order as f64) < STRONG {
+            return None;
+        }
+        let sensors = readings.count / setups.len().max(1);
+        let std_um = |order: usize, reading: usize| {
+            let matrix = order * sensors * sensors + reading % sensors * (sensors + 1);
+            setups[reading / sensors].get(matrix).map_or(0.0, |variance| variance.re.max(0.0).sqrt())
+        };
+        let (width, orders) = (self.layout.unknowns.len(), readings.max_order);
+        let mut squares = vec![[0.0; 2]; orders + 1];
+        for draw in 0..DRAWS {
+            let mut random = Draw::new(seed(&["coupled orders", &draw.to_string()]));
+            let noise: Vec<Complex64> = (0..readings.mean.len())
+                .map(|place| {
+                    let of = FRAC_1_SQRT_2 * std_um(place / readings.count, place % readings.count);
+                    of * Complex64::new(random.normal(), random.normal())
+                })
+                .collect();
+            let mut noisy = readings.clone();
+            noisy.mean.iter_mut().zip(&noise).for_each(|(reading, noise)| *reading += noise);
+            let (again, _) = self.iterate(&noisy, operators, |_, _| {});
+            let alone = self.estimate(operators, &noise, orders);
+            for order in 2..=orders {
+                for unknown in 0..width {
+                    let [again, alone, before] =
+                        [&again, &alone, estimate].map(|one| one.observable_value(order, unknown));
+                    squares[order][0] += (again - before).norm_sqr();
+                    squares[order][1] += alone.norm_sqr();
+                }
+            }
+        }
+        let factor = |order: usize| {
+            let near = &squares[order.saturating_sub(ORDERS_BESIDE)..=(order + ORDERS_BESIDE).min(orders)];
+            let [coupled, alone] = near.iter().fold([0.0; 2], |[a, b], one| [a + one[0], b + one[1]]);
+            if coupled > LARGER * alone && alone > 0.0 { coupled / alone } else { 1.0 }
+        };
+        Some((1..=orders).map(factor).collect())
+    }
+
     /// Where exact geometry does not settle.
     pub(super) fn unsettled(&self, station: &Station, readings: &Readings, estimate: &Estimate) -> Error {
         let (eccentricity_um, radius_mm) = (self.eccentricity_um(readings), self.selection.rig.part_radius_mm);
