@@ -267,8 +267,7 @@ fn missing(value: &Value) -> Option<String> {
     if let Some(order) = value.absent_above_upr {
         let said = format!("orders above {order}, the highest that there is, belong to it");
         let cut_off = value.band_upr[1];
-        let remedy = value.filter.as_deref().is_some_and(|filter| filter.starts_with("Gaussian")) && cut_off < order;
-        return Some(if remedy {
+        return Some(if cut_off < order {
             format!("{said}: `samples_per_rev` ≥ {} holds all", samples_for(cut_off))
         } else {
             said

@@ -1,12 +1,16 @@
 //! What is known of one station once it is separated.
 
-use runout_numerics::{Complex64, fourier::Fourier};
+use runout_numerics::{Complex64, fourier::Fourier, statistics::f_tail};
 
 use crate::{
     measurement::StationTruth,
     profile::Profile,
-    separation::{Quantity, Separation},
+    separation::{Quantity, Separation, VarianceFrom},
 };
+
+/// The last orders of a form, which say whether it goes on above them, and the chance of so much noise in them.
+const LAST_ORDERS: usize = 8;
+const BY_CHANCE: f64 = 1e-6;
 
 /// One station, done.
 #[derive(Debug, Clone, PartialEq)]
@@ -37,11 +41,30 @@ impl StationResult {
         self.profiles.iter().filter_map(of).reduce(f64::min)
     }
 
-    /// Form of a section above the highest order, as far as it shows: root mean square in µm.
+    /// Form of a section above the highest order, as far as it shows: root mean square in µm. An edge has all orders: where the last ones that there are
+    /// stand out from their noise, as much is above them.
     #[must_use]
     pub fn absent_um(&self, section: usize) -> f64 {
         let of_section = self.separation.sections.get(section).map_or(0.0, |at| at.absent_um);
-        self.profiles.iter().map(|profile| profile.absent_um).fold(of_section, f64::max)
+        let above = self.profiles.iter().map(|profile| profile.absent_um).fold(of_section, f64::max);
+        above.max(self.last_orders_um(section).unwrap_or(0.0))
+    }
+
+    /// What the last orders of a form have beyond their noise, in µm; `None` where that is no more than chance, or the noise is not known order by order.
+    fn last_orders_um(&self, section: usize) -> Option<f64> {
+        let separation = &self.separation;
+        let unknown = separation.position(Quantity::Form(section))?;
+        let known = separation.coefficients(unknown).zip(separation.noise_variance(unknown)).skip(2);
+        let known = known.map(|(value, variance)| (value.norm_sqr(), variance));
+        let known: Vec<(f64, f64)> = known.filter(|(square, variance)| square.is_finite() && *variance > 0.0).collect();
+        let last =
+            known.len().checked_sub(LAST_ORDERS).filter(|before| *before > LAST_ORDERS).map(|at| &known[at..])?;
+        let [squares, noise] =
+            last.iter().fold([0.0; 2], |[squares, noise], (square, of)| [squares + square, noise + of]);
+        let freedom = separation.degrees_of_freedom(separation.max_order()) as f64;
+        let is_chance = f_tail(squares / noise, 2.0 * LAST_ORDERS as f64, 2.0 * freedom) > BY_CHANCE;
+        let of_orders = separation.variance_from == VarianceFrom::OrdersBeside;
+        (of_orders && freedom > 0.0 && squares > noise && !is_chance).then(|| (0.5 * (squares - noise)).sqrt())
     }
 
     /// Share of the amplitude of an order that the filters before the averages pass, in the average where it is least.
