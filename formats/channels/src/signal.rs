@@ -46,6 +46,22 @@ impl Signal {
         })?;
         Ok((low, high))
     }
+
+    /// Whether it falls back by more than half of its range, each time against the way that it goes otherwise.
+    pub(crate) fn begins_anew(&self, range: f64) -> Result<bool> {
+        let (mut last, mut way, mut back) = (f64::NAN, 0.0, Vec::new());
+        self.each(|value| {
+            let step = value - last;
+            if step.abs() > 0.5 * range {
+                back.push(step.signum());
+            } else if step.is_finite() {
+                way += step;
+            }
+            last = value;
+            Ok(())
+        })?;
+        Ok(!back.is_empty() && back.iter().all(|sign| sign * way < 0.0))
+    }
 }
 
 /// How the numbers of a channel become those of the sensor.

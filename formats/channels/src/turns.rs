@@ -20,6 +20,8 @@ use crate::{
 
 /// Pulses whose distance differs by this factor from the one before are not next to each other.
 const LOST_PULSE: f64 = 1.7;
+/// Share of 2^n counts from which on a range is that of a counter.
+const FULL: f64 = 0.98;
 /// What to do where a trace has no marks.
 const LEVELS: &str = "set `threshold` and `hysteresis` of `marker` in [load] between its levels";
 /// What a channel is named that needs no configuration.
@@ -189,9 +191,13 @@ impl Turns {
         let instants = Instants::between(signals.common.clock, to);
         let instants = instants.map_err(|problem| signal.error(problem))?;
         let (low, high) = signal.range()?;
-        // What stays within one turn begins anew with each.
-        let is_wrapped = (high - low) * degrees <= 360.0;
-        let period_deg = is_wrapped.then_some(360.0);
+        // What stays within one turn begins anew with each; what falls back from more turns does so behind whole turns, or at the end of a counter of
+        // 2^n.
+        let turns = ((high - low) * degrees / 360.0).ceil().max(1.0);
+        let begins_anew = turns <= 1.0 || signal.begins_anew(high - low)?;
+        let counter = (high - low).log2().ceil().exp2();
+        let is_counter = turns > 1.0 && high - low >= FULL * counter;
+        let period_deg = begins_anew.then_some(if is_counter { degrees * counter } else { 360.0 * turns });
         let mut found = AngleSignal { signal, degrees, period_deg, scan: EncoderScan::default(), instants };
         let mut scan = EncoderScan::default();
         let mut reader = found.reader()?;

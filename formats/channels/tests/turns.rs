@@ -98,13 +98,16 @@ fn off(angles: &[f64], whole: f64) -> f64 {
 
 #[test]
 fn an_angle_is_read_in_any_unit_wrapped_or_not() {
-    let units: [(&str, &dyn Fn(f64) -> f64); 6] = [
+    let units: [(&str, &dyn Fn(f64) -> f64); 8] = [
         ("unit = \"deg\" }", &|time| 360.0 * turns_at(time)),
         ("unit = \"deg\" }", &|time| (360.0 * turns_at(time)).rem_euclid(360.0)),
         ("unit = \"deg\" }", &|time| (360.0 * turns_at(time) + 180.0).rem_euclid(360.0) - 180.0),
         ("unit = \"rad\" }", &|time| (std::f64::consts::TAU * turns_at(time)).rem_euclid(std::f64::consts::TAU)),
         ("unit = \"rev\" }", &turns_at),
         ("unit = \"counts\" }\npulses_per_turn = 4096", &|time| (4096.0 * turns_at(time)).rem_euclid(4096.0)),
+        // Counters of 16 bits, which begin anew behind 16 turns and behind 13.1.
+        ("unit = \"counts\" }\npulses_per_turn = 4096", &|time| (4096.0 * turns_at(time)).rem_euclid(65_536.0)),
+        ("unit = \"counts\" }\npulses_per_turn = 5000", &|time| (5000.0 * turns_at(time)).rem_euclid(65_536.0)),
     ];
     for (unit, angle) in units {
         let file = csv(RATE_HZ, 0.0, &[("S1", &s1), ("S2", &s2), ("Enc", angle)], SAMPLES);

@@ -13,12 +13,16 @@ use crate::{
     map::{MOST_POINTS, Map, NM_PER_UM, Wanted, checked_size, damaged, failed, places},
 };
 
+/// What separates cells that may be empty.
+const SEPARATORS: [char; 3] = [';', '\t', ','];
 /// Longest line: a row of a million points.
 const LINE: u64 = 32 << 20;
 /// Most lines before the first number.
 const HEADER: usize = 200;
 /// Columns of points.
 const POINT: usize = 3;
+/// Cells from which a line is a row where half of them are numbers, whatever the first one is.
+const ROW: usize = 8;
 /// How texts of two words say that there is no height; the words are one mark then.
 const NO_DATA: &str = "No Data";
 
@@ -55,6 +59,8 @@ pub(crate) fn read(input: &Input, wanted: &Wanted) -> Result<Map> {
     let shown = &input.shown;
     let mut file = BufReader::new(input.open()?);
     let (mut header, mut numbers, mut width, mut lines) = (Header::default(), Vec::new(), 0, 0_usize);
+    // Lines before the first number, and whether each row ends with a separator.
+    let (mut before, mut ended) = (Vec::new(), true);
     let mut bytes = Vec::new();
     loop {
         bytes.clear();
@@ -64,23 +70,38 @@ pub(crate) fn read(input: &Input, wanted: &Wanted) -> Result<Map> {
         }
         lines += 1;
         let line = String::from_utf8_lossy(&bytes);
-        let line = line.trim_start_matches('\u{feff}').trim();
+        // Tabs are left: they stand beside empty cells.
+        let line = line.trim_start_matches('\u{feff}').trim_matches([' ', '\n', '\r']);
         if line.is_empty() {
             continue;
         }
-        if line.starts_with(['#', '%']) || (width == 0 && !begins_with_number(line)) {
+        if line.starts_with(['#', '%']) {
             header.line(line);
-            if width == 0 && lines > HEADER {
+            continue;
+        }
+        if width == 0 && !begins_with_number(line) {
+            before.push(line.to_owned());
+            if lines > HEADER {
                 return Err(no_map(shown));
             }
             continue;
         }
-        let before = numbers.len();
-        cells(line, |number| numbers.push(number));
-        let found = numbers.len() - before;
         if width == 0 {
-            width = found;
+            cells(line, |_| width += 1);
+            for line in before.drain(..) {
+                // A row whose first point was not measured is none of the header.
+                if width > POINT && is_row(&line, width) {
+                    cells(&line, |number| numbers.push(number));
+                    ended &= line.ends_with(SEPARATORS);
+                } else {
+                    header.line(&line);
+                }
+            }
         }
+        let known = numbers.len();
+        cells(line, |number| numbers.push(number));
+        let found = numbers.len() - known;
+        ended &= line.ends_with(SEPARATORS);
         if found != width {
             return Err(damaged(
                 &format!("{shown}, line {lines}"),
@@ -93,6 +114,10 @@ pub(crate) fn read(input: &Input, wanted: &Wanted) -> Result<Map> {
     }
     if width == 0 || numbers.is_empty() {
         return Err(no_map(shown));
+    }
+    if ended && width > 1 {
+        numbers = numbers.chunks(width).flat_map(|row| &row[..width - 1]).copied().collect();
+        width -= 1;
     }
     let is_matrix =
         width != POINT || wanted.step_mm.iter().any(Option::is_some) || header.size_mm.iter().any(Option::is_some);
@@ -109,17 +134,27 @@ fn no_map(shown: &str) -> Error {
     damaged(shown, "it has no table of numbers: it is of none of the formats of maps").help(help)
 }
 
+/// Whether a line is of the table: it begins with a number, or half of many cells are numbers.
 fn begins_with_number(line: &str) -> bool {
-    let mut first = None;
-    cells(line, |number| {
-        first.get_or_insert(number);
-    });
-    first.is_some_and(f64::is_finite)
+    let mut all = Vec::new();
+    cells(line, |number| all.push(number));
+    let known = all.iter().filter(|number| number.is_finite()).count();
+    all.first().is_some_and(|first| first.is_finite()) || (all.len() >= ROW && 2 * known >= all.len())
+}
+
+/// Whether a line without a number at its beginning is a row of so many cells: some are numbers, or all say the same.
+fn is_row(line: &str, width: usize) -> bool {
+    let mut all = Vec::new();
+    cells(line, |number| all.push(number));
+    let mut words = line.split([';', '\t', ',', ' ']).map(str::trim).filter(|word| !word.is_empty());
+    let first = words.next();
+    let alike = all.iter().all(|number| number.is_nan()) && words.all(|word| Some(word) == first);
+    all.len() == width && (alike || all.iter().any(|number| number.is_finite()))
 }
 
 /// Gives the numbers of a line, NaN for what is none.
 fn cells(line: &str, mut each: impl FnMut(f64)) {
-    let separator = [';', '\t'].into_iter().find(|separator| line.contains(*separator));
+    let separator = SEPARATORS[..2].iter().copied().find(|separator| line.contains(*separator));
     let blanks = separator.is_none() && line.split_whitespace().nth(1).is_some();
     let comma = separator.is_none() && line.contains(',') && (!blanks || line.contains(", "));
     let parse = |text: &str| {
@@ -130,8 +165,8 @@ fn cells(line: &str, mut each: impl FnMut(f64)) {
             .unwrap_or(f64::NAN)
     };
     match separator {
-        Some(separator) => line.trim_end_matches(separator).split(separator).for_each(|text| each(parse(text))),
-        None if comma => line.trim_end_matches(',').split(',').for_each(|text| each(parse(text))),
+        Some(separator) => line.split(separator).for_each(|text| each(parse(text))),
+        None if comma => line.split(',').for_each(|text| each(parse(text))),
         None if line.contains(NO_DATA) => {
             line.replace(NO_DATA, "NaN").split_whitespace().for_each(|text| each(parse(text)));
         }

@@ -61,6 +61,37 @@ fn every_file_is_read_as_its_reference_library_reads_it() {
     }
 }
 
+/// A void in the first cell makes no header of the first row, and one in the last cell no shorter row; names of columns are none.
+#[test]
+fn rows_of_text_begin_and_end_with_voids() {
+    let folder = tempfile::tempdir().unwrap();
+    let read = |name: &str, lines: &[&str]| {
+        let path = folder.path().join(name);
+        fs::write(&path, lines.join("\n")).unwrap();
+        let wanted = Wanted { unit: Some("nm".into()), step_mm: [Some(0.1), Some(0.1)], ..Wanted::default() };
+        read(&path, &wanted).unwrap().grid
+    };
+    let heights = |grid: &HeightGrid| -> Vec<Option<i32>> {
+        grid.height_nm.iter().map(|height| height.is_finite().then_some(*height as i32)).collect()
+    };
+    for void in ["NaN", "***", "BAD", ""] {
+        for separator in [";", "\t", ","] {
+            let row = |cells: [&str; 4]| cells.join(separator);
+            let first = read("first.txt", &[&row([void, "2", "3", "4"]), &row(["5", "6", "7", "8"])]);
+            assert_eq!((first.columns, first.rows()), (4, 2), "{void:?} {separator:?}");
+            assert_eq!(heights(&first), [None, Some(2), Some(3), Some(4), Some(5), Some(6), Some(7), Some(8)]);
+            let last = read("last.txt", &[&row(["1", "2", "3", void]), &row(["5", "6", "7", "8"])]);
+            assert_eq!(heights(&last), [Some(1), Some(2), Some(3), None, Some(5), Some(6), Some(7), Some(8)]);
+            let ended = read("ended.txt", &["1;2;3;4;", "5;6;7;8;"]);
+            assert_eq!((ended.columns, ended.rows()), (4, 2));
+        }
+    }
+    let named = read("named.txt", &["a b c d", "1 2 3 4", "5 6 7 8"]);
+    assert_eq!((named.columns, named.rows()), (4, 2), "names of columns are a header");
+    let void = read("void.txt", &["NaN NaN NaN NaN", "1 2 3 4", "5 6 7 8"]);
+    assert_eq!((void.columns, void.rows()), (4, 3), "a row of voids is none");
+}
+
 #[test]
 fn files_say_what_they_leave_out() {
     let of = |name: &str| read(&data().join(name), &Wanted::default());

@@ -4,8 +4,8 @@ use arrow_array::{
     Array,
     cast::AsArray,
     types::{
-        Float32Type, Float64Type, Int8Type, Int16Type, Int32Type, Int64Type, UInt8Type, UInt16Type, UInt32Type,
-        UInt64Type,
+        Decimal128Type, Float32Type, Float64Type, Int8Type, Int16Type, Int32Type, Int64Type, UInt8Type, UInt16Type,
+        UInt32Type, UInt64Type,
     },
 };
 use arrow_schema::DataType;
@@ -72,6 +72,13 @@ fn cells(values: &dyn Array) -> Option<RawColumn> {
         DataType::UInt16 => numbers!(UInt16Type),
         DataType::UInt32 => numbers!(UInt32Type),
         DataType::UInt64 => numbers!(UInt64Type),
+        DataType::Decimal128(_, scale) => RawColumn::Numbers(
+            values
+                .as_primitive::<Decimal128Type>()
+                .iter()
+                .map(|value| value.map_or(f64::NAN, |value| value as f64 / 10_f64.powi(i32::from(*scale))))
+                .collect(),
+        ),
         DataType::Boolean => RawColumn::Numbers(
             values.as_boolean().iter().map(|flag| flag.map_or(f64::NAN, |flag| f64::from(u8::from(flag)))).collect(),
         ),

@@ -20,6 +20,9 @@ const SAME: f64 = 1e-6;
 /// Two names as near as this (Jaro-Winkler) are one with a slip of the pen.
 const ALIKE: f64 = 0.93;
 
+/// Numbers of one quantity in two units differ by less than this share of the largest: one of them has few digits.
+const ROUNDED: f64 = 0.01;
+
 /// Columns that coordinates give about an axis.
 const ABOUT: [&str; 3] = ["angle_deg", "radius_mm", "z_mm"];
 
@@ -31,7 +34,7 @@ pub(crate) fn points(
 ) -> Result<Points> {
     let path = input.path();
     let table = renamed(table, path, config)?;
-    let file = Raw { file: path.display().to_string(), table };
+    let file = Raw { file: path.display().to_string(), has_commas: has_commas(&table), table };
     let coordinates = file.coordinates(wanted);
     if let (Some(_), None) = (config.axis, coordinates) {
         let problem = "`axis` turns x_mm, y_mm and z_mm into places about an axis; the file lacks one of them, or the separator takes none";
@@ -94,9 +97,23 @@ fn renamed(mut table: RawTable, path: &Path, config: &PointsConfig) -> Result<Ra
     Ok(table)
 }
 
+/// Rows that show which decimal mark a file has.
+const MARKED_ROWS: usize = 1000;
+
+/// Whether numbers of a table have decimal commas: a point in others then stands between thousands.
+fn has_commas(table: &RawTable) -> bool {
+    let is_marked = |text: &String| text.contains(',') && text.replace(',', ".").parse::<f64>().is_ok();
+    let marked = |column: &RawColumn| match column {
+        RawColumn::Texts(texts) => texts.iter().take(MARKED_ROWS).any(is_marked),
+        RawColumn::Numbers(_) => false,
+    };
+    table.decimal_comma && table.columns.iter().any(marked)
+}
+
 /// A file with its name for messages.
 struct Raw {
     file: String,
+    has_commas: bool,
     table: RawTable,
 }
 
@@ -187,8 +204,27 @@ impl Raw {
                         return Err(refuse(problem));
                     }
                 }
-                1 => {}
+                1 => self.agrees(column.name)?,
                 _ => return Err(refuse(format!("the column `{}` is there twice", column.name))),
+            }
+        }
+        Ok(())
+    }
+
+    /// Refuses a column beside which the same quantity stands in another unit, with other numbers.
+    fn agrees(&self, name: &str) -> Result<()> {
+        let Some(own) = self.place(name) else { return Ok(()) };
+        let others = self.table.names.iter().enumerate().filter(|(other, _)| *other != own);
+        for (other, alias, factor) in others.filter_map(|(at, alias)| Some((at, alias, unit::factor(alias, name)?))) {
+            let pair = |row: usize| Some((row, self.number(own, row).ok()?, self.number(other, row).ok()?));
+            let pairs: Vec<(usize, f64, f64)> = (0..self.table.rows).filter_map(pair).collect();
+            let largest = pairs.iter().map(|(_, one, _)| one.abs()).fold(0.0, f64::max);
+            let differs = |(_, one, same): &&(usize, f64, f64)| (one - factor * same).abs() > ROUNDED * largest;
+            if let Some((row, one, same)) = pairs.iter().find(differs) {
+                let problem = format!("`{name}` is {one} and `{alias}` is {same}: which one is meant?");
+                let help =
+                    format!("rename the other one by `columns` in [load]: columns = {{ \"{alias}\" = \"unused\" }}");
+                return Err(self.refuse(other, *row, &problem).help(help));
             }
         }
         Ok(())
@@ -277,6 +313,10 @@ impl Raw {
             RawColumn::Numbers(numbers) => numbers[row].to_string(),
             RawColumn::Texts(_) => self.text(place, row)?,
         };
+        if self.has_commas && text.contains('.') {
+            let problem = format!("expected a number with a decimal comma as in the other rows, found `{text}`");
+            return Err(self.refuse(place, row, &problem).help(MARKS));
+        }
         let parsed = if self.table.decimal_comma { text.replace(',', ".").parse() } else { text.parse() };
         match parsed {
             Ok(number) if f64::is_finite(number) => Ok(number),

@@ -79,6 +79,27 @@ fn an_optional_column_that_is_empty_is_absent() {
 }
 
 #[test]
+fn a_point_beside_decimal_commas_is_none_of_a_number() {
+    let thousands = "ball;dx_mm\nB1;1.250\nB2;0,42\n";
+    let error = from(thousands, "", &LABELLED).unwrap_err();
+    assert!(error.to_string().contains("line 2") && error.to_string().contains("found `1.250`"), "{error}");
+    assert_eq!(from(&thousands.replace("0,42", "0.42"), "", &LABELLED).unwrap().column("dx_mm").unwrap(), [1.25, 0.42]);
+}
+
+#[test]
+fn one_quantity_in_two_units_has_one_number() {
+    let rounded = "ball,dx_mm,dx_um\nB1,0.003,3.4\nB1,0.052,51.7\n";
+    assert_eq!(from(rounded, "", &LABELLED).unwrap().column("dx_mm").unwrap(), [0.003, 0.052]);
+    let other = rounded.replace("51.7", "31.7");
+    let error = from(&other, "", &LABELLED).unwrap_err();
+    assert!(error.to_string().contains("`dx_mm` is 0.052 and `dx_um` is 31.7: which one is meant?"), "{error}");
+    let chosen = from(&other, "columns = { dx_um = \"unused\" }", &LABELLED).unwrap();
+    assert_eq!(chosen.column("dx_mm").unwrap(), [0.003, 0.052]);
+    let chosen = from(&other, "columns = { dx_um = \"dx_mm\" }", &LABELLED).unwrap();
+    assert_eq!(chosen.column("dx_mm").unwrap(), [3.4, 31.7], "as the file says");
+}
+
+#[test]
 fn rows_are_selected_and_columns_renamed() {
     let text = "ball;ΔX;a_deg;dx_mm;note\nP1;0,01;0;7;x\nP1;0,02;90;8;\nP2;0,03;0;9;y\n";
     let keys = "columns = { \"ΔX\" = \"dx_mm\" }\nwhere = { a_deg = 0 }";
