@@ -5,6 +5,7 @@ use runout_core::{
     consistency::{Check, Test},
     draws::OpenErrors,
     height_grid::GridPlaces,
+    numerics::{number::significant, statistics::median},
     points::Points,
     stage::{Evaluable, OpenProfile, Outcome, far_below_noise},
     table::{ColumnSpec, Figure, Measure, TableRows, TableSpec, numbers},
@@ -23,6 +24,11 @@ const NM_PER_UM: f64 = 1e3;
 /// their covariances 20, −15, 6, −1 on both sides.
 const OF_THIRD_DIFFERENCES: f64 = 20.0;
 const INDEPENDENT: f64 = 400.0 / 924.0;
+/// The same of fourth differences, 1 + 16 + 36 + 16 + 1; the median of sizes of a normal variable of deviation 1; and deviations that noise does not
+/// reach.
+const OF_FOURTH_DIFFERENCES: f64 = 70.0;
+const MEDIAN_OF_NORMAL: f64 = 0.674_489_750_196_081_7;
+const FAR: f64 = 8.0;
 
 /// The table of the profile.
 pub(crate) fn table() -> TableSpec {
@@ -76,7 +82,10 @@ pub(crate) fn outcome(points: &Points, config: &AsMeasuredConfig) -> Result<Outc
         }
         None => Err(NO_NOISE.to_owned()),
     };
-    let checks: Vec<Check> = errors.iter().filter_map(|errors| overstated(&grid.height_nm, &errors.std_um)).collect();
+    let told = |errors: &OpenErrors| {
+        [overstated(&grid.height_nm, &errors.std_um), alone(&grid.height_nm, &z_mm, &errors.std_um)]
+    };
+    let checks: Vec<Check> = errors.iter().flat_map(told).flatten().collect();
     let deviation_um: Vec<f64> = grid.height_nm.iter().map(|height| height / NM_PER_UM).collect();
     let known = || z_mm.iter().zip(&grid.height_nm).filter(|(_, height)| height.is_finite());
     if known().count() < 3 {
@@ -105,6 +114,35 @@ pub(crate) fn outcome(points: &Points, config: &AsMeasuredConfig) -> Result<Outc
     })
 }
 
+/// Names a point that its neighbours do not follow: dust, a burr, or a scratch narrower than the step. It is off from the cubic through the two on either
+/// side by far more than its noise and than others are from theirs, and these agree with each other without it.
+fn alone(height_nm: &[f64], z_mm: &[f64], std_um: &[f64]) -> Option<Check> {
+    let off = |height_nm: &[f64], at: usize| {
+        let five = height_nm.get(at.checked_sub(2)?..at + 3)?;
+        let off_nm = five[2] - (4.0 * (five[1] + five[3]) - five[0] - five[4]) / 6.0;
+        off_nm.is_finite().then_some(off_nm)
+    };
+    let all: Vec<(usize, f64)> = (0..height_nm.len()).filter_map(|at| Some((at, off(height_nm, at)?))).collect();
+    let usual_nm = median(all.iter().map(|(_, off_nm)| off_nm.abs())) / MEDIAN_OF_NORMAL;
+    let std_nm = |at: usize| NM_PER_UM * std_um[at] * OF_FOURTH_DIFFERENCES.sqrt() / 6.0;
+    let share = |(at, off_nm): &(usize, f64)| off_nm.abs() / std_nm(*at).max(usual_nm);
+    let farthest = all.iter().max_by(|one, other| share(one).total_cmp(&share(other)))?;
+    let (at, off_nm) = *farthest;
+    let mut without = height_nm.to_vec();
+    without[at] -= off_nm;
+    let agree = |near: usize| off(&without, near).is_none_or(|off_nm| share(&(near, off_nm)) < 0.5 * FAR);
+    let is_alone = share(farthest) > FAR && (at.saturating_sub(2)..=at + 2).all(agree);
+    is_alone.then(|| {
+        Check::new(Test::Rows, format!("x = {:.4} mm", z_mm[at]), share(farthest), &[], 0.0).finding(|| {
+            format!(
+                "the point at x = {:.4} mm is off by {} µm from those beside it: dust or a burr, or a scratch that one point does not describe",
+                z_mm[at],
+                significant(off_nm / NM_PER_UM, 3)
+            )
+        })
+    })
+}
+
 /// Whether neighbouring points scatter far less than is stated: third differences have the noise and what the profile adds to it.
 fn overstated(height_nm: &[f64], std_um: &[f64]) -> Option<Check> {
     let differences = height_nm.windows(4).map(|four| four[3] - 3.0 * four[2] + 3.0 * four[1] - four[0]);
@@ -116,4 +154,37 @@ fn overstated(height_nm: &[f64], std_um: &[f64]) -> Option<Check> {
         Check::new(Test::Residual, "noise of neighbouring points", ratio, &[dof as f64], 0.0)
             .finding(|| format!("neighbouring points scatter by less than `std_nm`: {words}"))
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 400 points of a wave with a noise of 40 nm, and what is added to them.
+    fn said(added_nm: impl Fn(usize) -> f64) -> Option<String> {
+        let mut state = 5_u64;
+        let mut uniform = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+        };
+        let mut height = |at: usize| {
+            2000.0 * (at as f64 / 60.0).sin() + 40.0 * (0..12).map(|_| uniform()).sum::<f64>() + added_nm(at)
+        };
+        let height_nm: Vec<f64> = (0..400).map(&mut height).collect();
+        let z_mm: Vec<f64> = (0..400).map(|at| 0.1 * f64::from(at)).collect();
+        alone(&height_nm, &z_mm, &vec![0.04; 400]).map(|check| check.finding)
+    }
+
+    #[test]
+    fn a_point_alone_is_named_and_what_the_profile_has_is_not() {
+        for size_nm in [3000.0, -600.0] {
+            let found = said(|at| if at == 250 { size_nm } else { 0.0 });
+            assert!(found.as_ref().is_some_and(|said| said.contains("x = 25.0000 mm")), "{size_nm}: {found:?}");
+        }
+        assert_eq!(said(|_| 0.0), None);
+        // A step, a groove of several points, a texture of two points.
+        assert_eq!(said(|at| if at > 200 { 3000.0 } else { 0.0 }), None);
+        assert_eq!(said(|at| if (200..206).contains(&at) { -3000.0 } else { 0.0 }), None);
+        assert_eq!(said(|at| if at % 2 == 0 { 500.0 } else { 0.0 }), None);
+    }
 }
