@@ -129,7 +129,9 @@ impl LinearModel for RTest {
             let parameters = names.map(|name| Parameter { name, unit: "um".into(), tolerance: 10.0 }).collect();
             Effect { id: format!("harmonic-{order}"), targets: Vec::new(), parameters }
         };
-        (2..=self.0.max_order).map(harmonic).collect()
+        let drift = COORDINATES.map(|(name, _)| Parameter { name: name.into(), unit: "um".into(), tolerance: 5.0 });
+        let drift = Effect { id: "thermal-drift".into(), targets: Vec::new(), parameters: drift.into() };
+        (2..=self.0.max_order).map(harmonic).chain([drift]).collect()
     }
 
     fn terms(&self, points: &Points) -> Result<LinearTerms> {
@@ -154,10 +156,19 @@ impl LinearModel for RTest {
             };
             [one("level", 0, f64::cos), one("cos C", 1, f64::cos), one("sin C", 1, f64::sin)]
         });
+        // From the first point to the last one, in the order of the file.
+        let course = |coordinate: usize| -> Vec<f64> {
+            let share = |point: usize| point as f64 / (count.max(2) - 1) as f64;
+            (0..3 * count).map(|row| if row / count == coordinate { share(row % count) } else { 0.0 }).collect()
+        };
         let terms = (2..).zip(self.candidates()).map(|(order, effect)| {
-            let columns =
-                (0..3).flat_map(|coordinate| [wave(coordinate, order, f64::cos), wave(coordinate, order, f64::sin)]);
-            Term { effect, columns: columns.collect(), rank: 0 }
+            let columns: Vec<Vec<f64>> = if order > self.0.max_order {
+                (0..3).map(course).collect()
+            } else {
+                let waves = |coordinate| [wave(coordinate, order, f64::cos), wave(coordinate, order, f64::sin)];
+                (0..3).flat_map(waves).collect()
+            };
+            Term { effect, columns, rank: 0 }
         });
         let observations = Observations {
             values,

@@ -94,7 +94,8 @@ impl Missing {
                 ("angular", target, vec![order(), parameter("amplitude", "urad", 20.0)])
             }
             Self::Drift(axis) => {
-                let parameters = vec![parameter("change", "um", 5.0), parameter("bend", "um", 2.0)];
+                let parameters = [("change", 5.0), ("bend", 2.0), ("early_bend", 1.0)];
+                let parameters = parameters.map(|(name, usual)| parameter(name, "um", usual)).into();
                 ("thermal-drift", LETTERS[axis].to_lowercase(), parameters)
             }
             Self::Pitch(axis) => {
@@ -149,7 +150,7 @@ impl Missing {
             Self::Squareness(moved, with) => vec![Term::Squareness(moved, with)],
             Self::Straightness(moved, axis) => vec![Term::Linear { moved, axis, order }],
             Self::Angular(about, axis) => vec![Term::Angular { about, axis, order }],
-            Self::Drift(axis) => vec![Term::Drift(axis), Term::Bend(axis)],
+            Self::Drift(axis) => vec![Term::Drift(axis), Term::Bend(axis), Term::EarlyBend(axis)],
             Self::Pitch(axis) => {
                 let Shape::Period { mm: period_mm, .. } = shape else { return Vec::new() };
                 [false, true].map(|cosine| Term::Pitch { axis, period_mm, cosine }).into()

@@ -36,6 +36,8 @@ pub enum Term {
     Drift(usize),
     /// Bend of a drift: its course at half time less half its change, µm.
     Bend(usize),
+    /// What a drift has at a quarter of the time, and less at three quarters, besides its bend, µm: a warm-up goes fast at first.
+    EarlyBend(usize),
     /// Sine or cosine of an axis' place, from the middle of the volume, over a period, µm.
     Pitch { axis: usize, period_mm: f64, cosine: bool },
     /// What a sine and a cosine, in µm, gain as their period grows, of the relative change of the period.
@@ -130,6 +132,7 @@ impl Term {
             }
             Self::Drift(axis) => adds[axis] = time,
             Self::Bend(axis) => adds[axis] = 4.0 * time * (1.0 - time),
+            Self::EarlyBend(axis) => adds[axis] = 32.0 / 3.0 * time * (1.0 - time) * (1.0 - 2.0 * time),
             Self::Pitch { axis, period_mm, cosine } => {
                 let turn = std::f64::consts::TAU * from_middle(axis) / period_mm;
                 adds[axis] = if cosine { turn.cos() } else { turn.sin() };
@@ -151,7 +154,7 @@ impl Term {
     /// Whether it depends on time.
     #[must_use]
     pub fn moves_in_time(self) -> bool {
-        matches!(self, Self::Drift(_) | Self::Bend(_) | Self::After { .. })
+        matches!(self, Self::Drift(_) | Self::Bend(_) | Self::EarlyBend(_) | Self::After { .. })
     }
 
     /// Whether it is the change of a sine or cosine with its period.
