@@ -11,6 +11,9 @@ use crate::solve::Readings;
 const LARGEST_UM: f64 = 2000.0;
 /// Amplitude below the eccentricity of a part that is centred as well as can be, and below the noise of usual sensors, in µm.
 const SMALLEST_UM: f64 = 0.005;
+/// Below this amplitude they may be, where single samples scatter by less than any displacement sensor.
+const SMALL_UM: f64 = 0.5;
+const LEAST_NOISE_UM: f64 = 5e-5;
 
 /// Sensors that look the same way, and setups, of which some are about a thousand times smaller or larger than the others.
 pub(crate) fn mistaken_units(rig: &Rig, readings: &Readings) -> Vec<Check> {
@@ -38,7 +41,8 @@ pub(crate) fn unusual_sizes(rig: &Rig, readings: &Readings) -> Vec<String> {
     // Setups add up in a size.
     let setups = (readings.count / sizes.len().max(1)).max(1) as f64;
     let most_um = sizes.iter().copied().fold(0.0, f64::max) / setups.sqrt();
-    let below = (most_um > 0.0 && most_um < SMALLEST_UM).then(|| {
+    let is_quiet = || readings.sample_noise_um().is_some_and(|noise_um| noise_um > 0.0 && noise_um < LEAST_NOISE_UM);
+    let below = (most_um > 0.0 && (most_um < SMALLEST_UM || (most_um < SMALL_UM && is_quiet()))).then(|| {
         format!(
             "the readings of all sensors vary by no more than about {} µm over a turn: they may be in a larger unit than declared \
              (millimetres or metres where µm is declared): write `unit = \"mm\"` at the sensors, or convert them to µm",

@@ -1,7 +1,8 @@
 //! One station's averaged readings, in the layout's order.
 
 use runout_core::{
-    Complex64, Error, Result, consistency::turns::TurnCourse, near_tone::NearTone, profile::Profile, stage::Station,
+    Complex64, Error, Result, consistency::turns::TurnCourse, near_tone::NearTone, numerics::statistics::median,
+    profile::Profile, stage::Station,
 };
 
 use crate::{layout::Layout, selection::Selection};
@@ -128,6 +129,22 @@ impl Readings {
                 }
             }
         }
+    }
+
+    /// About what single samples scatter by, of the quietest channel: from the median over the orders. `None` where it is not known.
+    pub(crate) fn sample_noise_um(&self) -> Option<f64> {
+        let sensors = self.count / self.turns.len().max(1);
+        let of_setup = |(matrices, turns): (&Vec<Complex64>, &usize)| {
+            let channel = |channel: usize| {
+                let of_orders =
+                    matrices.chunks_exact(sensors * sensors).skip(1).map(|matrix| matrix[channel * (sensors + 1)].re);
+                // E|c|² of a mean of T turns of N samples with the variance σ² is 4σ²/NT.
+                (0.25 * median(of_orders) * (self.samples_per_rev * turns) as f64).sqrt()
+            };
+            (0..sensors).map(channel).fold(f64::INFINITY, f64::min)
+        };
+        let all = self.covariance.as_ref()?.iter().zip(&self.turns);
+        all.map(of_setup).reduce(f64::min)
     }
 
     /// Adds to the covariance of the averages what tones near whole orders put into them.

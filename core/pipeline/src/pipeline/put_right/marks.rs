@@ -154,7 +154,8 @@ pub(super) fn say(found: &[RecountedProfile], stations: &[Station], rig: &Rig, l
                 into.added.push(added(phase, targets.clone(), levels, chance(found)));
                 into.advice.extend(phase.step_at.map(|[turn, _]| {
                     format!(
-                        "{}: samples of {:.3}° are lost near turn {turn:.0}: the turns there are left out; count them by marks of the spindle",
+                        "{}: samples of {:.3}° are lost near turn {turn:.0}, or the part slipped in its clamping by as much: the turns there are left out; count \
+                         them by marks of the spindle, and look at the clamping",
                         targets.join(" "),
                         -phase.by_rad.to_degrees()
                     )
