@@ -120,6 +120,27 @@ fn intervals_hold_the_truth_of_waves_and_of_steps() {
     }
 }
 
+/// Axes that stand still have no drift together either.
+#[test]
+fn the_combined_drift_of_axes_that_stand_still_contains_nothing() {
+    let mut held = 0;
+    for seed in 0..40 {
+        let mut random = StdRng::seed_from_u64(2000 + seed);
+        let minutes = || (0..240).map(f64::from);
+        let mut columns =
+            vec![Column { name: "time_s".into(), values: minutes().map(|minute| 60.0 * minute).collect() }];
+        for name in ["x_um", "y_um", "z_um"] {
+            let values = minutes().map(|_| 0.3 * noise(&mut random)).collect();
+            columns.push(Column { name: name.into(), values });
+        }
+        let found = separated("", &Points { columns, ..Points::default() }).unwrap();
+        let [low, _] = value(&found, "combined-drift", None).interval_95().unwrap();
+        held += usize::from(low <= 0.0);
+    }
+    println!("simulated, three axes that stand still: {held} of 40");
+    assert!(held >= 34, "{held}");
+}
+
 /// A window that is nearly empty is left out, and so is a gap, with a remark.
 #[test]
 fn windows_without_readings_are_left_out() {

@@ -59,3 +59,33 @@ fn the_pipeline_finds_noise_only() {
     println!("{:?} {:?}", found.verdict, found.before);
     assert_eq!(found.verdict, Verdict::AtNoiseFloor);
 }
+
+/// A tip that bends in the middle of the campaign contradicts the touches as a whole: the values of the ring's form are marked as those of the
+/// probe are.
+#[test]
+fn what_contradicts_the_touches_marks_the_form_too() {
+    let folder = tempfile::tempdir().unwrap();
+    let touches = std::fs::read_to_string(example("touches.csv")).unwrap();
+    let rows = touches.lines().count();
+    let bent = |(row, line): (usize, &str)| {
+        let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+        if row > rows / 2 {
+            let [direction, radius] = [2, 3].map(|cell| cells[cell].parse::<f64>().unwrap());
+            cells[3] = (radius + 3e-3 * (direction - 40.0).to_radians().cos()).to_string();
+        }
+        cells.join(",") + "\n"
+    };
+    let text: String = touches.lines().enumerate().map(bent).collect();
+    std::fs::write(folder.path().join("touches.csv"), text).unwrap();
+    let pipeline = std::fs::read_to_string(example("pipeline.toml")).unwrap();
+    let pipeline = pipeline.split("[diagnose]").next().unwrap();
+    let sources = Sources::from_text("pipeline.toml", pipeline, folder.path().into(), &[], "rig").unwrap();
+    let pipeline = Pipeline::from_sources(&sources, &registry()).unwrap();
+    let summary = runout_core::pipeline::run::run(&pipeline, None, &Silent).unwrap();
+    let of_form: Vec<_> =
+        summary.stations.iter().flat_map(|station| &station.sections).flat_map(|section| &section.values).collect();
+    assert!(!of_form.is_empty());
+    for value in summary.values.iter().chain(of_form) {
+        assert!(value.refuted_by.is_some(), "{} {:?}", value.symbol, value.of);
+    }
+}
