@@ -28,7 +28,7 @@ mod rule;
 mod spikes;
 
 use channel::{Channel, Look};
-pub use held::Held;
+pub use held::HeldChannel;
 use rule::Rule;
 pub use spikes::Spike;
 
@@ -78,23 +78,23 @@ pub struct Inspection<'a> {
     chunk: usize,
     ended: bool,
     /// Channels whose readings stand for several samples, once the first frames were looked at.
-    several: Option<Vec<Held>>,
-    report: Option<Box<dyn FnOnce(Unusual) + Send + 'a>>,
+    several: Option<Vec<HeldChannel>>,
+    report: Option<Box<dyn FnOnce(UnusualReadings) + Send + 'a>>,
 }
 
 /// What is unusual in a capture, and handed on.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Unusual {
+pub struct UnusualReadings {
     /// Readings far from all others.
     pub spikes: Vec<Spike>,
     /// Channels whose readings stand for several samples each.
-    pub held: Vec<Held>,
+    pub held: Vec<HeldChannel>,
 }
 
 impl<'a> Inspection<'a> {
     /// Wraps a loader's stream; at its end `report` gets what is unusual.
     #[must_use]
-    pub fn reporting(input: Box<dyn SampleStream + 'a>, report: impl FnOnce(Unusual) + Send + 'a) -> Self {
+    pub fn reporting(input: Box<dyn SampleStream + 'a>, report: impl FnOnce(UnusualReadings) + Send + 'a) -> Self {
         Self { report: Some(Box::new(report)), ..Self::new(input) }
     }
 
@@ -232,7 +232,7 @@ impl SampleStream for Inspection<'_> {
                 if let Some(report) = self.report.take() {
                     let spike = |(index, channel): (usize, &Channel)| channel.spike(index);
                     let spikes = self.channels.iter().enumerate().filter_map(spike).collect();
-                    report(Unusual { spikes, held: self.several.take().unwrap_or_default() });
+                    report(UnusualReadings { spikes, held: self.several.take().unwrap_or_default() });
                 }
             }
         }

@@ -24,7 +24,7 @@ use runout_turning::{
     calibrated::calibrated,
     counted_turns,
     input_file::InputFile,
-    inspection::{Held, Inspection, Spike, Unusual},
+    inspection::{HeldChannel, Inspection, Spike, UnusualReadings},
     measurement::{Capture, Recording, SampleStream, StationKey},
     profile::{Profile, RejectedTurn},
     provenance::Input,
@@ -79,7 +79,7 @@ impl RecordReader<'_> {
         });
         let setups = self.rig.setups.len();
         // What is unusual in a capture, `[station][setup]`.
-        let unusual: Vec<Mutex<Unusual>> = (0..stations.len() * setups).map(|_| Mutex::default()).collect();
+        let unusual: Vec<Mutex<UnusualReadings>> = (0..stations.len() * setups).map(|_| Mutex::default()).collect();
         let worker = || {
             let claimed = std::iter::from_fn(|| {
                 let more = !failed.load(Ordering::Relaxed);
@@ -147,7 +147,7 @@ impl RecordReader<'_> {
         station: usize,
         setup: usize,
         counted_by: &[PhaseCourse],
-        unusual: &'b Mutex<Unusual>,
+        unusual: &'b Mutex<UnusualReadings>,
     ) -> Result<Box<dyn SampleStream + 'b>> {
         let opened = calibrated(self.recording.open_with(threads, station, setup)?, self.rig);
         let opened = counted_turns::declared(opened, self.rig.setups[setup].turns_per_mark);
@@ -162,7 +162,7 @@ impl RecordReader<'_> {
         &self,
         (index, key): (usize, &StationKey),
         captures: &mut dyn Captures<usize>,
-        unusual: &[Mutex<Unusual>],
+        unusual: &[Mutex<UnusualReadings>],
     ) -> Result<Station> {
         let mut profiles = Ok(Vec::with_capacity(self.rig.setups.len()));
         for (setup, unusual) in unusual.iter().enumerate() {
@@ -173,7 +173,7 @@ impl RecordReader<'_> {
                 let stream = capture?;
                 let capture = stream.capture().clone();
                 let mut profile = self.averager.average_requested(stream, wanted)?;
-                let Unusual { spikes, held } =
+                let UnusualReadings { spikes, held } =
                     std::mem::take(&mut *unusual.lock().unwrap_or_else(PoisonError::into_inner));
                 profile.warnings.extend(far_from_others(&spikes, &capture, &profile));
                 profile.course.checks.extend(faster_than_sensors(&held, &capture));
@@ -198,7 +198,7 @@ impl RecordReader<'_> {
 }
 
 /// That readings stand for several samples: between them, angles go on and readings do not.
-fn faster_than_sensors(held: &[Held], capture: &Capture) -> Option<Check> {
+fn faster_than_sensors(held: &[HeldChannel], capture: &Capture) -> Option<Check> {
     let samples = held.iter().map(|one| one.samples).max()?;
     let sensors: Vec<&str> =
         held.iter().filter_map(|one| capture.sensor_ids.get(one.channel).map(String::as_str)).collect();

@@ -2,7 +2,7 @@
 
 /// A channel whose readings stand for several samples each.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Held {
+pub struct HeldChannel {
     /// Index of the channel in the capture.
     pub channel: usize,
     /// Samples that a reading stands for, about.
@@ -17,7 +17,7 @@ const EQUAL: f64 = 0.4;
 const STEPS: f64 = 8.0;
 
 /// Looks at the first frames of a capture.
-pub(super) fn held(samples: &[f64], channels: usize) -> Vec<Held> {
+pub(super) fn held(samples: &[f64], channels: usize) -> Vec<HeldChannel> {
     let one = |channel: usize| {
         let readings = || samples.iter().skip(channel).step_by(channels).take(FRAMES[1]);
         let steps = || readings().zip(readings().skip(1)).map(|(before, now)| (now - before).abs());
@@ -31,7 +31,7 @@ pub(super) fn held(samples: &[f64], channels: usize) -> Vec<Held> {
         let [finest, .., _] = changes[..] else { return None };
         let is_fine = changes[changes.len() / 2] > STEPS * finest;
         let samples = all as f64 / changes.len() as f64;
-        (is_fine && 1.0 - samples.recip() >= EQUAL).then(|| Held { channel, samples: samples.round() as usize })
+        (is_fine && 1.0 - samples.recip() >= EQUAL).then(|| HeldChannel { channel, samples: samples.round() as usize })
     };
     (0..channels).filter_map(one).collect()
 }
@@ -41,7 +41,7 @@ mod tests {
     use super::*;
 
     /// Two channels of 2000 frames: a wave with a scatter, and the same held, each rounded to steps.
-    fn found(held_for: usize, step: f64, turn: f64) -> Vec<Held> {
+    fn found(held_for: usize, step: f64, turn: f64) -> Vec<HeldChannel> {
         let reading = |frame: usize| {
             let scatter = (frame.wrapping_mul(2_654_435_761) >> 7) % 1000;
             let value = 8.0 * (std::f64::consts::TAU * frame as f64 / turn).sin() + 4e-5 * scatter as f64;
@@ -54,7 +54,7 @@ mod tests {
     #[test]
     fn held_readings_are_found_and_coarse_ones_are_not() {
         for samples in [2, 4, 8] {
-            assert_eq!(found(samples, 1e-5, 256.0), [Held { channel: 1, samples }]);
+            assert_eq!(found(samples, 1e-5, 256.0), [HeldChannel { channel: 1, samples }]);
         }
         assert!(found(1, 1e-5, 256.0).is_empty());
         // Steps of the converter that are as large as what the signal changes by from sample to sample, and far larger.

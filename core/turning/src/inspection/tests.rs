@@ -232,7 +232,7 @@ fn a_slow_swing_of_few_steps_is_not_stuck() {
 fn spikes(stream: MemoryStream) -> Vec<Spike> {
     let (sender, reported) = std::sync::mpsc::channel();
     let mut inspection =
-        Inspection::reporting(Box::new(stream), move |found: Unusual| sender.send(found.spikes).unwrap());
+        Inspection::reporting(Box::new(stream), move |found: UnusualReadings| sender.send(found.spikes).unwrap());
     let mut block = Block::default();
     while inspection.next_block(&mut block).unwrap() {}
     drop(inspection);

@@ -28,13 +28,12 @@ pub(super) fn effects(
             return Err(document::resolve(fault.help("give it another id"), &table));
         }
         let refused = match (kind, effect.is::<Arc<dyn PointEffect>>()) {
-            (SourceKind::Points, false) => Fault::span(
-                table.span(),
-                "it changes a channel of turns, and [load] gives measured points",
-            )
-            .help("columns = [\"x_mm\"], changes = [\"slope_urad\"]: what it takes of the points, and what it adds to"),
+            (SourceKind::Points, false) => {
+                Fault::span(table.span(), "it changes a channel of turns, and [load] gives measured points")
+                    .help("an effect of points names the columns that it takes: columns = [\"temperature_k\"]")
+            }
             (SourceKind::Turns, true) => {
-                Fault::at("columns", "turns have no columns").help("leave `columns`, `labels` and `changes` out")
+                Fault::at("columns", "turns have no columns").help("leave `columns` and `labels` out")
             }
             _ => {
                 effects.add(effect);
