@@ -145,15 +145,18 @@ fn directions_have_the_letters_of_the_machine() {
 fn every_value_has_a_known_symbol_and_unit() {
     let text = "directions_deg = [30]\nfaces = [{ radius_mm = 20, angle_deg = 0 }]";
     let found = evaluated(axis(equal(24), &closed_form, Ok(independent(24, 1e-4, 1e-3))), text);
-    let known = settings(text).symbols();
+    let known = settings(text).known_values();
     for value in &found.values {
-        let known = known.iter().find(|(symbol, _)| *symbol == value.symbol);
-        assert_eq!(known.map(|(_, unit)| unit.replace('µ', "u")), Some(value.unit.clone()), "{}", value.symbol);
+        let known = known.iter().find(|known| known.symbol == value.symbol);
+        assert_eq!(known.map(|known| known.unit.replace('µ', "u")), Some(value.unit.clone()), "{}", value.symbol);
     }
     // z is across an axis along x or y.
-    let given = known.iter().filter(|(symbol, _)| !symbol.contains("radial-z") && !symbol.contains("tilt-z"));
+    let given = known
+        .iter()
+        .map(|known| &known.symbol)
+        .filter(|symbol| !symbol.contains("radial-z") && !symbol.contains("tilt-z"));
     assert_eq!(given.count(), found.values.len());
-    assert!(known.iter().all(|(symbol, _)| !symbol.starts_with("total") && !symbol.starts_with("asynchronous")));
+    assert!(known.iter().all(|known| !known.symbol.starts_with("total") && !known.symbol.starts_with("asynchronous")));
 }
 
 fn limited(found: &Evaluated, limit: &str, text: &str) -> (Decision, Option<String>) {

@@ -404,7 +404,7 @@ fn groups_that_nothing_gives_are_refused_by_name_and_left_out_of_all() {
     assert!(config("values = 'all'").check_given(&open).is_ok() && config("").check_given(&open).is_ok());
     let mut all = config("values = 'all'").check().unwrap();
     all.keep_given(&open);
-    let symbols: Vec<String> = all.symbols().into_iter().map(|(symbol, _)| symbol).collect();
+    let symbols: Vec<String> = all.known_values().into_iter().map(|value| value.symbol).collect();
     assert!(symbols.contains(&"STRt".to_owned()) && !symbols.contains(&"RONt".to_owned()), "{symbols:?}");
     assert!(!symbols.contains(&"Ra".to_owned()), "without λc an open profile has none");
     // Circles inside and around have no line: nothing would be left of straightness.

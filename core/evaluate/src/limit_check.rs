@@ -1,7 +1,10 @@
 //! Whether a limit names a value that is computed.
 
 use super::{Evaluate, Limit, ascii_unit};
-use crate::error_motion::{self, Centre, WITH_FUNDAMENTAL};
+use crate::{
+    error_motion::Centre,
+    known::{KnownValue, Referred},
+};
 use runout_error::fault::{Fault, known_names};
 use runout_turning::rig::Rig;
 
@@ -16,21 +19,19 @@ impl Limit {
         own: &[(&'static str, &'static str)],
         rig: Option<&Rig>,
     ) -> Result<Self, Fault> {
-        let mut symbols = evaluate.symbols();
-        symbols.extend(own.iter().map(|(symbol, unit)| ((*symbol).to_owned(), *unit)));
-        match symbols.iter().find(|(symbol, _)| *symbol == self.symbol) {
-            Some((symbol, unit)) if ascii_unit(unit) != ascii_unit(&self.unit) => {
-                let message = format!("{symbol} is given in `{}`, found `{}`", ascii_unit(unit), self.unit);
-                return Err(Fault::at("unit", message));
-            }
-            None => {
-                let fault = Fault::at("symbol", format!("no value `{}` is computed", self.symbol));
-                let mut known: Vec<&str> = symbols.iter().map(|(symbol, _)| &**symbol).collect();
-                known.dedup();
-                let more = "`values` and `lambda_c_mm` in [evaluate] give more";
-                return Err(fault.help(format!("{}; {more}", known_names(&self.symbol, known))));
-            }
-            Some(_) => {}
+        let mut values = evaluate.known_values();
+        values.extend(own.iter().map(|(symbol, unit)| KnownValue::new(*symbol, unit, Referred::Other)));
+        let Some(KnownValue { symbol, unit, referred }) = values.iter().find(|value| value.symbol == self.symbol)
+        else {
+            let fault = Fault::at("symbol", format!("no value `{}` is computed", self.symbol));
+            let mut known: Vec<&str> = values.iter().map(|value| &*value.symbol).collect();
+            known.dedup();
+            let more = "`values` and `lambda_c_mm` in [evaluate] give more";
+            return Err(fault.help(format!("{}; {more}", known_names(&self.symbol, known))));
+        };
+        if ascii_unit(unit) != ascii_unit(&self.unit) {
+            let message = format!("{symbol} is given in `{}`, found `{}`", ascii_unit(unit), self.unit);
+            return Err(Fault::at("unit", message));
         }
         let known = |key: &str, asked: &Option<String>, names: Vec<String>| match asked {
             Some(asked) if !names.contains(asked) => {
@@ -41,28 +42,17 @@ impl Limit {
         };
         self.check_orders()?;
         known("filter", &self.filter, evaluate.filter_names())?;
-        let symbols = |of: &dyn Fn(&runout_standards::roundness::Reference) -> &'static str| {
-            evaluate.references.iter().map(|reference| of(reference).to_owned()).collect()
+        let references = || evaluate.references.iter();
+        let references: Option<Vec<&str>> = match referred {
+            Referred::Circles => Some(references().map(|one| one.symbol()).collect()),
+            Referred::Lines => Some(references().filter_map(|one| one.line_symbol()).collect()),
+            Referred::Cylinders => Some(references().map(|one| one.cylinder_symbol()).collect()),
+            Referred::Chart => Some(vec![Centre::PolarChart.symbol()]),
+            Referred::Centres => Some(evaluate.centres.iter().map(|centre| centre.symbol()).collect()),
+            Referred::Other => None,
         };
-        match &*self.symbol {
-            "RONt" | "RONp" | "RONv" | "RONq" | "dr/dtheta" => {
-                known("reference", &self.reference, symbols(&|one| one.symbol()))?;
-            }
-            "STRt" | "STRp" | "STRv" | "STRq" => {
-                let lines = evaluate.references.iter().filter_map(|reference| reference.line_symbol());
-                known("reference", &self.reference, lines.map(str::to_owned).collect())?;
-            }
-            "CYLt" | "CYLp" | "CYLv" | "CYLq" => {
-                known("reference", &self.reference, symbols(&|one| one.cylinder_symbol()))?;
-            }
-            symbol if symbol.ends_with(WITH_FUNDAMENTAL) || error_motion::is_along_axis(symbol) => {
-                known("reference", &self.reference, vec![Centre::PolarChart.symbol().to_owned()])?;
-            }
-            symbol if ["synchronous-", "residual-", "total-"].iter().any(|kind| symbol.starts_with(kind)) => {
-                let centres = evaluate.centres.iter().map(|centre| centre.symbol().to_owned());
-                known("reference", &self.reference, centres.collect())?;
-            }
-            _ => {}
+        if let Some(names) = references {
+            known("reference", &self.reference, names.into_iter().map(str::to_owned).collect())?;
         }
         if let Some(rig) = rig {
             known("section", &self.section, rig.sections.clone())?;

@@ -2,7 +2,7 @@
 
 use crate::{
     Evaluate, Group, ReferenceCircle, Value, circles,
-    error_motion::{Centre, ErrorMotion, behind_low_pass, below_absent, with_jitter_of_marks},
+    error_motion::{Centre, ErrorMotion, behind_low_pass, below_absent},
     run_out,
     section::{missing_circles, section_values, steepest_um_per_deg},
 };
@@ -111,7 +111,6 @@ fn error_motion_values(result: &StationResult, centres: &[Centre], radius_mm: f6
     let steepest = forms.map(|(unknown, _)| steepest_um_per_deg(&result.over_angle(unknown))).fold(0.0, f64::max);
     let slope = steepest.to_degrees() / (1e3 * radius_mm);
     let values = ErrorMotion { station, z_mm: *z_mm, angles: *angles, separation, profiles, slope }.values(centres);
-    let values = with_jitter_of_marks(values, profiles);
     let goes_on = profiles.iter().any(|profile| profile.absent_um > 0.0);
     let values = if goes_on { below_absent(values) } else { values };
     match result.half_power_upr() {

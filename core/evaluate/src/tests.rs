@@ -881,7 +881,7 @@ fn a_unit_may_be_written_in_each_usual_way() {
     }
     // No symbol is given to two values; Ra has a filter or none.
     let evaluate = evaluate("values = ['roundness', 'cylindricity', 'areal', 'error-motion']").unwrap();
-    let mut symbols: Vec<String> = evaluate.symbols().into_iter().map(|(symbol, _)| symbol).collect();
+    let mut symbols: Vec<String> = evaluate.known_values().into_iter().map(|value| value.symbol).collect();
     let count = symbols.len();
     symbols.sort();
     symbols.dedup();

@@ -3,6 +3,7 @@
 use super::{Evaluate, Group, USUAL_UPR, once_each};
 use crate::error_motion;
 use crate::filter::{Filter, between_name, robust_name, waviness_name};
+use crate::known::{KnownValue, Referred};
 use runout_standards::{areal, texture::Kind, twist};
 
 impl Evaluate {
@@ -29,60 +30,64 @@ impl Evaluate {
         once_each(round.chain(robust).chain(between).chain(waviness).collect())
     }
 
-    /// Symbols and units of the values that may come.
+    /// The values that may come.
     #[must_use]
-    pub fn symbols(&self) -> Vec<(String, &'static str)> {
-        let mut symbols: Vec<(&'static str, &'static str)> = Vec::new();
+    pub fn known_values(&self) -> Vec<KnownValue> {
+        let mut known: Vec<KnownValue> = Vec::new();
+        let mut add = |symbols: &[&'static str], unit, referred| {
+            known.extend(symbols.iter().map(|symbol| KnownValue::new(*symbol, unit, referred)));
+        };
         if self.has(Group::Roundness) {
-            symbols.extend(["RONt", "RONp", "RONv", "RONq"].map(|symbol| (symbol, "µm")));
-            symbols.push(("dr/dtheta", "µm/°"));
+            add(&["RONt", "RONp", "RONv", "RONq"], "µm", Referred::Circles);
+            add(&["dr/dtheta"], "µm/°", Referred::Circles);
             if self.slope_window_deg.is_some() {
-                symbols.push(("slope", "µm"));
+                add(&["slope"], "µm", Referred::Other);
             }
         }
         if self.has(Group::Harmonics) {
-            symbols.extend([("amplitude", "µm"), ("phase", "°")]);
+            add(&["amplitude"], "µm", Referred::Other);
+            add(&["phase"], "°", Referred::Other);
         }
         if self.has(Group::Straightness) {
-            symbols.extend(["STRt", "STRp", "STRv", "STRq"].map(|symbol| (symbol, "µm")));
+            add(&["STRt", "STRp", "STRv", "STRq"], "µm", Referred::Lines);
         }
         if self.has(Group::Texture) {
             if self.of_closed {
-                symbols.push(("Ra", "µm"));
+                add(&["Ra"], "µm", Referred::Other);
             }
             for kind in &self.texture.profiles {
                 if *kind == Kind::P || self.lambda_c_mm.is_some() {
-                    symbols.extend(kind.parameters().iter().map(|(symbol, unit, _)| (*symbol, *unit)));
-                    symbols.push((kind.material_ratio_symbol(), "%"));
+                    kind.parameters().iter().for_each(|(symbol, unit, _)| add(&[*symbol], *unit, Referred::Other));
+                    add(&[kind.material_ratio_symbol()], "%", Referred::Other);
                 }
             }
         }
         if self.has(Group::Cylindricity) {
-            let names = ["CYLt", "CYLp", "CYLv", "CYLq", "CYLtt", "STRsg", "STRsa", "coaxiality", "parallelism"];
-            symbols.extend(names.map(|symbol| (symbol, "µm")));
+            add(&["CYLt", "CYLp", "CYLv", "CYLq"], "µm", Referred::Cylinders);
+            add(&["CYLtt", "STRsg", "STRsa", "coaxiality", "parallelism"], "µm", Referred::Other);
             if !self.datum.is_empty() {
-                symbols.extend(["eccentricity", "circular-run-out", "total-run-out"].map(|symbol| (symbol, "µm")));
+                add(&["eccentricity", "circular-run-out", "total-run-out"], "µm", Referred::Other);
             }
         }
         if self.has(Group::RunOut) {
-            symbols.extend([("TIR", "µm"), ("eccentricity-angle", "°")]);
+            add(&["TIR"], "µm", Referred::Other);
+            add(&["eccentricity-angle"], "°", Referred::Other);
             if !self.has(Group::Cylindricity) || self.datum.is_empty() {
-                symbols.push(("eccentricity", "µm"));
+                add(&["eccentricity"], "µm", Referred::Other);
             }
         }
         if self.has(Group::Areal) {
-            symbols.extend(areal::PARAMETERS.iter().map(|(symbol, unit, _)| (*symbol, *unit)));
-            symbols.extend([("Smr(c)", "%"), ("Smc(p)", "µm")]);
+            areal::PARAMETERS.iter().for_each(|(symbol, unit, _)| add(&[*symbol], *unit, Referred::Other));
+            add(&["Smr(c)"], "%", Referred::Other);
+            add(&["Smc(p)"], "µm", Referred::Other);
         }
         if self.has(Group::Twist) {
-            symbols.extend(twist::PARAMETERS.iter().map(|(symbol, unit, _)| (*symbol, *unit)));
+            twist::PARAMETERS.iter().for_each(|(symbol, unit, _)| add(&[*symbol], *unit, Referred::Other));
         }
-        let mut symbols: Vec<(String, &'static str)> =
-            symbols.into_iter().map(|(symbol, unit)| (symbol.to_owned(), unit)).collect();
         if self.has(Group::ErrorMotion) {
             let of_axis = if self.of_turns { error_motion::symbols } else { error_motion::standing_symbols };
-            symbols.extend(of_axis(&self.directions, &self.faces));
+            known.extend(of_axis(&self.directions, &self.faces));
         }
-        symbols
+        known
     }
 }

@@ -15,7 +15,6 @@
 //! Of an axis that was measured at standing positions, [`StandingMotion`] gives the synchronous values.
 
 mod axial;
-mod marks;
 mod names;
 mod plots;
 mod polar;
@@ -26,15 +25,16 @@ mod tests;
 mod turns;
 mod weakened;
 
-pub use marks::with_jitter_of_marks;
-pub use names::{WITH_FUNDAMENTAL, is_along_axis, standing_symbols, symbols};
+pub use names::{standing_symbols, symbols};
 pub use plots::{Spectrum, TurnsPlot};
 pub use polar::Centre;
 pub use standing::{Fundamental, StandingMotion, weights};
 pub use weakened::{behind_low_pass, below_absent};
 
 use crate::Value;
-use names::{STANDARD, XYZ, chosen_id, described, fundamental_across, id, kind_of, over, place, unit};
+use names::{
+    STANDARD, WITH_FUNDAMENTAL, XYZ, chosen_id, described, fundamental_across, id, kind_of, over, place, unit,
+};
 use polar::{Motion, Synchronous};
 use runout_draws::{self as draws, Uncertainty};
 use runout_standards::roundness::{Angles, Points, Reference};
@@ -251,20 +251,33 @@ impl ErrorMotion<'_> {
             )
         };
         let [std, rms_std] = [widest, rms_across].map(|across| self.carried(direction, spreads, across));
-        [
-            value(
-                format!("asynchronous-{id}"),
-                "largest spread at one angle",
-                each.iter().copied().fold(0.0, f64::max),
-                between_setups(&each, std),
-            ),
-            value(
-                format!("asynchronous-{id}-rms"),
-                "root mean square about the mean at each angle",
-                root_mean_square(&each_rms),
-                between_setups(&each_rms, rms_std),
-            ),
-        ]
+        let largest = value(
+            format!("asynchronous-{id}"),
+            "largest spread at one angle",
+            each.iter().copied().fold(0.0, f64::max),
+            between_setups(&each, std),
+        );
+        let rms = value(
+            format!("asynchronous-{id}-rms"),
+            "root mean square about the mean at each angle",
+            root_mean_square(&each_rms),
+            between_setups(&each_rms, rms_std),
+        );
+        let without_jitter = self.without_jitter(direction, rms.value);
+        [largest, rms].map(|mut value| {
+            if let (Some(share), Some(known)) = (without_jitter, &mut value.uncertainty) {
+                *known = known.clone().with_equivalents(value.value, &[share * value.value]);
+            }
+            value
+        })
+    }
+
+    /// Share of radial asynchronous motion that is left without what marks that turn add to [single turns](Profile::jitter_um).
+    fn without_jitter(&self, direction: Direction, rms_um: f64) -> Option<f64> {
+        let evaluated = self.profiles.iter().filter(|profile| profile.spread.is_some());
+        let added_um = evaluated.map(Profile::jitter_um).fold(0.0, f64::max);
+        let is_radial = !direction.is_tilt() && !direction.is_axial();
+        (is_radial && added_um > 0.0).then(|| (1.0 - (added_um / rms_um).powi(2)).max(0.0).sqrt())
     }
 
     /// A direction as symbols name it.

@@ -1,7 +1,10 @@
 //! Symbols of error motion values, and what they are of in words.
 
 use super::Centre;
-use crate::Value;
+use crate::{
+    Value,
+    known::{KnownValue, Referred},
+};
 use runout_draws::Uncertainty;
 use runout_turning::{
     azimuth::{Azimuth, FacePlace},
@@ -10,56 +13,78 @@ use runout_turning::{
 
 pub(super) const STANDARD: &str = "ISO 230-7:2015";
 
-/// Directions as symbols name them, but for those that are chosen.
-pub(super) const DIRECTIONS: [&str; 8] =
-    ["radial-x", "radial-y", "radial-rotating", "radial-along", "tilt-x", "tilt-y", "tilt-rotating", "tilt-along"];
+/// Directions as symbols name them, but for those that are chosen: radial, and of tilt.
+const RADIAL: [&str; 4] = ["radial-x", "radial-y", "radial-rotating", "radial-along"];
+const TILT: [&str; 4] = ["tilt-x", "tilt-y", "tilt-rotating", "tilt-along"];
 
-/// Symbol and unit of every value that there may be, with those in chosen directions.
+/// Every value that there may be, with those in chosen directions.
 #[must_use]
-pub fn symbols(lines: &[Azimuth], faces: &[FacePlace]) -> Vec<(String, &'static str)> {
-    let chosen = lines.iter().flat_map(|line| [Direction::Along(*line), Direction::TiltAlong(*line)]).map(chosen_id);
-    let mut symbols = Vec::new();
-    for id in DIRECTIONS.into_iter().map(str::to_owned).chain(chosen) {
-        let tilt = id.starts_with("tilt");
-        let unit = if tilt { "µrad" } else { "µm" };
-        for kind in [if tilt { RESIDUAL } else { "synchronous" }, "total", "asynchronous"] {
-            symbols.extend([format!("{kind}-{id}"), format!("{kind}-{id}-rms")].map(|symbol| (symbol, unit)));
-        }
-        symbols.push((format!("total-{id}{WITH_FUNDAMENTAL}"), unit));
+pub fn symbols(lines: &[Azimuth], faces: &[FacePlace]) -> Vec<KnownValue> {
+    let chosen = |of: fn(Azimuth) -> Direction| lines.iter().map(move |line| chosen_id(of(*line)));
+    let named = |names: [&'static str; 4]| names.into_iter().map(str::to_owned);
+    let radial = named(RADIAL).chain(chosen(Direction::Along)).map(|id| (id, "µm", "synchronous"));
+    let tilt = named(TILT).chain(chosen(Direction::TiltAlong)).map(|id| (id, "µrad", RESIDUAL));
+    let mut known = Known::default();
+    for (id, unit, synchronous) in radial.chain(tilt) {
+        known.both([synchronous, "total"], &id, unit, Referred::Centres);
+        known.both(["asynchronous"], &id, unit, Referred::Other);
+        known.one(format!("total-{id}{WITH_FUNDAMENTAL}"), unit, Referred::Chart);
     }
-    let axial = std::iter::once(Direction::Axial).chain(faces.iter().copied().map(Direction::Face));
-    for id in axial.map(chosen_id) {
-        for kind in ["synchronous", RESIDUAL, "total", "asynchronous"] {
-            symbols.extend([format!("{kind}-{id}"), format!("{kind}-{id}-rms")].map(|symbol| (symbol, "µm")));
-        }
-        symbols.push((format!("fundamental-{id}"), "µm"));
+    for id in along_axis(faces) {
+        known.both(["synchronous", RESIDUAL, "total"], &id, "µm", Referred::Chart);
+        known.both(["asynchronous"], &id, "µm", Referred::Other);
+        known.one(format!("fundamental-{id}"), "µm", Referred::Chart);
     }
-    symbols.extend([("fundamental-radial".to_owned(), "µm"), ("fundamental-tilt".to_owned(), "µrad")]);
-    symbols
+    known.with_fundamentals()
+}
+
+/// Values of error motion that may come.
+#[derive(Default)]
+struct Known(Vec<KnownValue>);
+
+impl Known {
+    fn one(&mut self, symbol: String, unit: &'static str, referred: Referred) {
+        self.0.push(KnownValue::new(symbol, unit, referred));
+    }
+
+    /// Peak to valley and root mean square of each kind.
+    fn both<const N: usize>(&mut self, kinds: [&str; N], id: &str, unit: &'static str, referred: Referred) {
+        for kind in kinds {
+            self.one(format!("{kind}-{id}"), unit, referred);
+            self.one(format!("{kind}-{id}-rms"), unit, referred);
+        }
+    }
+
+    /// Those of 1/rev across the axis.
+    fn with_fundamentals(mut self) -> Vec<KnownValue> {
+        self.one("fundamental-radial".to_owned(), "µm", Referred::Chart);
+        self.one("fundamental-tilt".to_owned(), "µrad", Referred::Chart);
+        self.0
+    }
+}
+
+/// Axial and of faces.
+fn along_axis(faces: &[FacePlace]) -> impl Iterator<Item = String> {
+    std::iter::once(Direction::Axial).chain(faces.iter().copied().map(Direction::Face)).map(chosen_id)
 }
 
 /// The same of an axis at standing positions, which have no turns: no asynchronous and total values. The axis may lie along x or y, so that
 /// z is across it.
 #[must_use]
-pub fn standing_symbols(lines: &[Azimuth], faces: &[FacePlace]) -> Vec<(String, &'static str)> {
-    let fixed = XYZ.iter().flat_map(|letter| [format!("radial-{letter}"), format!("tilt-{letter}")]);
-    let chosen = lines.iter().flat_map(|line| [Direction::Along(*line), Direction::TiltAlong(*line)]).map(chosen_id);
-    let axial = std::iter::once(Direction::Axial).chain(faces.iter().copied().map(Direction::Face)).map(chosen_id);
-    let mut symbols = Vec::new();
-    let mut both = |kind: &str, id: &str, unit| {
-        symbols.extend([format!("{kind}-{id}"), format!("{kind}-{id}-rms")].map(|symbol| (symbol, unit)));
-    };
-    for id in fixed.chain(chosen) {
-        if id.starts_with("tilt") { both(RESIDUAL, &id, "µrad") } else { both("synchronous", &id, "µm") }
+pub fn standing_symbols(lines: &[Azimuth], faces: &[FacePlace]) -> Vec<KnownValue> {
+    let mut known = Known::default();
+    let fixed = |kind: &str| XYZ.map(|letter| format!("{kind}-{letter}"));
+    for id in fixed("radial").into_iter().chain(lines.iter().map(|line| chosen_id(Direction::Along(*line)))) {
+        known.both(["synchronous"], &id, "µm", Referred::Centres);
     }
-    let axial: Vec<String> = axial.collect();
-    for id in &axial {
-        both("synchronous", id, "µm");
-        both(RESIDUAL, id, "µm");
+    for id in fixed("tilt").into_iter().chain(lines.iter().map(|line| chosen_id(Direction::TiltAlong(*line)))) {
+        known.both([RESIDUAL], &id, "µrad", Referred::Centres);
     }
-    symbols.extend(axial.into_iter().map(|id| (format!("fundamental-{id}"), "µm")));
-    symbols.extend([("fundamental-radial".to_owned(), "µm"), ("fundamental-tilt".to_owned(), "µrad")]);
-    symbols
+    for id in along_axis(faces) {
+        known.both(["synchronous", RESIDUAL], &id, "µm", Referred::Chart);
+        known.one(format!("fundamental-{id}"), "µm", Referred::Chart);
+    }
+    known.with_fundamentals()
 }
 
 /// Letters of the machine's directions in the places of x, y and z of an axis along z.
@@ -79,14 +104,7 @@ pub(super) fn kind_of(direction: Direction) -> (&'static str, &'static str) {
 /// Kind of the synchronous values of tilt.
 pub(super) const RESIDUAL: &str = "residual-synchronous";
 /// End of the symbols of total values with 1/rev. Their centre is that of the polar chart: any other moves with 1/rev.
-pub const WITH_FUNDAMENTAL: &str = "-with-fundamental";
-
-/// Whether a symbol is of motion along the axis, axial or of a face: these values are about the centre of the polar chart. Asynchronous
-/// ones have no centre.
-#[must_use]
-pub fn is_along_axis(symbol: &str) -> bool {
-    !symbol.starts_with("asynchronous-") && (symbol.contains("-axial") || symbol.contains("-face-at-"))
-}
+pub(super) const WITH_FUNDAMENTAL: &str = "-with-fundamental";
 
 /// The turns behind a range.
 pub(super) fn over(spreads: &[&Spread]) -> String {

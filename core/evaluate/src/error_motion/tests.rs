@@ -165,8 +165,9 @@ fn every_value_has_a_known_symbol_and_unit() {
     // Along one line there is motion only where x and y are not observable (`plugins/spindle/tests/error_motion.rs`).
     let symbols = symbols(&[Azimuth::of(LINE_DEG.to_radians())], &[]);
     // Along the axis where sensors look along it (`plugins/spindle/tests/axial.rs`).
-    let of_plane = symbols.into_iter().filter(|(symbol, _)| !symbol.contains("-along") && !symbol.contains("-axial"));
-    let mut known: Vec<(String, String)> = of_plane.map(|(symbol, unit)| (symbol, unit.replace('µ', "u"))).collect();
+    let of_plane =
+        symbols.into_iter().filter(|known| !known.symbol.contains("-along") && !known.symbol.contains("-axial"));
+    let mut known: Vec<(String, String)> = of_plane.map(|known| (known.symbol, known.unit.replace('µ', "u"))).collect();
     found.sort();
     known.sort();
     assert_eq!(found, known);

@@ -52,11 +52,11 @@ pub(super) fn evaluate(
     if let Some(rig) = measures {
         evaluate.add_faces(rig);
     }
-    let standard = evaluate.symbols();
+    let standard = evaluate.known_values();
     for (evaluator, table) in evaluators.iter().zip(tables(root, "evaluator")?) {
         let symbols = evaluator.symbols();
         let is_known = |symbol: &str| {
-            own.iter().any(|(known, _)| *known == symbol) || standard.iter().any(|(known, _)| known == symbol)
+            own.iter().any(|(known, _)| *known == symbol) || standard.iter().any(|known| known.symbol == symbol)
         };
         if let Some((symbol, _)) = symbols.iter().find(|(symbol, _)| is_known(symbol)) {
             let fault = Fault::here(format!("the value `{symbol}` is computed already")).help("give it another symbol");
