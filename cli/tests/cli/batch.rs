@@ -87,8 +87,8 @@ fn one_job_and_two_give_the_same_and_what_is_done_is_skipped() {
     for (path, bytes) in &one {
         assert!(two[path] == *bytes, "{} differs", path.display());
     }
-    // Form, circles, motion, harmonics, residuals, values, consistency, and turns and spectra of motion and tilt of three, values and trend of all.
-    assert_eq!(one.len(), 11 * 3 + 2, "{:?}", one.keys());
+    // Form, circles, motion, harmonics, values, consistency, and turns and spectra of motion and tilt of three, values and trend of all.
+    assert_eq!(one.len(), 10 * 3 + 2, "{:?}", one.keys());
     assert!(one.contains_key(Path::new("form/recording=a%20b%3Dc%25%22ü%23/0.parquet")), "{:?}", one.keys());
     let mean = |report: &Value, value: &str| {
         let series = report["trend"].as_array().unwrap();

@@ -128,6 +128,11 @@ impl ResultWriter {
         })
     }
 
+    /// What a model leaves of each averaged reading is wanted too.
+    pub(super) fn with_residuals(&mut self) {
+        self.station_tables.with_residuals();
+    }
+
     /// Takes a station's form and motion.
     pub(super) fn take(&mut self, station: &EvaluatedStation, rig: Option<&Rig>) -> Result<()> {
         let result = &station.result;

@@ -54,6 +54,8 @@ pub struct StationTables {
     reading: TableSpec,
     residual: TableSpec,
     values: TableSpec,
+    /// Whether residuals of readings are wanted: they are most of a result's rows.
+    with_residuals: bool,
     /// Those of error motion turn by turn, of each so many stations.
     turns: Vec<TableSpec>,
     every: usize,
@@ -81,6 +83,7 @@ impl StationTables {
             reading: reading(),
             residual: residual(),
             values: values(),
+            with_residuals: false,
             turns: turn_tables::specs(rig.map_or(&[], |rig| &rig.bearings)),
             every: 1,
             taken: 0,
@@ -95,6 +98,11 @@ impl StationTables {
     #[must_use]
     pub fn of_stations(self, stations: usize) -> Self {
         Self { every: stations.div_ceil(turn_tables::STATIONS).max(1), ..self }
+    }
+
+    /// The same with the residual of each averaged reading.
+    pub(super) fn with_residuals(&mut self) {
+        self.with_residuals = true;
     }
 
     /// What of error motion turn by turn is left out, where something is.
@@ -152,7 +160,7 @@ impl StationTables {
         if separation.has_no_observable_form() {
             tables.push((&self.reading, reading_rows(result, self.rig.as_ref())));
         }
-        if !separation.residual.by_reading.is_empty() {
+        if self.with_residuals && !separation.residual.by_reading.is_empty() {
             tables.push((&self.residual, residual_rows(result, self.rig.as_ref())));
         }
         let rows = |(table, columns): (&TableSpec, Vec<ArrayRef>)| {
