@@ -308,10 +308,12 @@ impl<M: Model> Tracing<'_, M> {
         let as_much = unlisted.into_iter().filter(|(_, gain)| *gain > taken);
         trials.extend(as_much.filter_map(|(effect, gain)| try_out(self, effect, gain)));
         // BIC counts in units of what each trial leaves; the best one's unit is common to all.
-        let alike = trials.into_iter().filter(|(_, other, evidence)| {
+        let alike = trials.into_iter().filter(|(place, other, _)| {
             let difference = (other.chi2 - trial.chi2) / unit.max(f64::MIN_POSITIVE);
+            let more = self.model.effects()[*place].parameters.len() as f64 - count as f64;
+            let by_bic = more * (after.dof.max(1) as f64).ln() + difference;
             difference < SAME_BIC
-                && evidence.delta_bic - chosen < SAME_BIC.max(0.02 * chosen.abs())
+                && by_bic < SAME_BIC.max(0.02 * chosen.abs())
                 && overlap(&before.residual, [&after.residual, &other.fit.residual]) > OVERLAP
         });
         let mut members = vec![effect];
