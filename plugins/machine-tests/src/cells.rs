@@ -11,9 +11,6 @@ use runout_core::{
 
 use crate::runs::{Approaches, Noise, Runs, mean, std};
 
-/// First letters of values that contain a drift by their definition: repeatability, and accuracy with it.
-const CONTAIN_DRIFT: [char; 2] = ['R', 'A'];
-
 /// How remarks name what a test has.
 pub(crate) struct Terms {
     pub unit: &'static str,
@@ -60,14 +57,14 @@ pub(crate) fn remarks(approaches: &Approaches, noise: &Noise, terms: &Terms) -> 
     remarks
 }
 
-/// Widens what is known of values that are no measure of a drift by what they would change without one, where the runs drift, and says so of each
-/// that this matters for. `values` are those of [`Cells::values`], in that order.
+/// Widens what is known of values by what they would change without the drift of the means, where the runs drift, and says so of each that this
+/// matters for. The scatter of the runs has the drift, by the definition of repeatability. `values` are those of [`Cells::values`], in that order.
 pub(crate) fn widen_by_drift(approaches: &Approaches, noise: &Noise, values: &mut [Value], unit: &str) -> Vec<Check> {
     if noise.of_whole_runs(approaches.targets.len() * approaches.sides.len()) != Runs::Drift {
         return Vec::new();
     }
-    let without = Cells::of(&approaches.without_drift()).values(&approaches.sides);
-    let changed = values.iter_mut().zip(without).filter(|(value, _)| !value.symbol.starts_with(CONTAIN_DRIFT));
+    let without = Cells { mean: Cells::of(&approaches.without_drift()).mean, ..Cells::of(approaches) };
+    let changed = values.iter_mut().zip(without.values(&approaches.sides));
     let check = |(value, (symbol, without, _)): (&mut Value, (String, f64, &str))| {
         let (found, known) = (value.value, value.uncertainty.as_mut()?);
         let change = found - without;

@@ -165,6 +165,35 @@ pub(crate) fn approaches(of: &Approaches, along: &[f64], [place, unit]: [&str; 2
         format!("approach {number} of target {target} in direction {side:+}")
     };
     checks.extend(single(&places, named, unit));
+    checks.extend(one_after_the_other(of, unit));
+    checks
+}
+
+/// Where each target is approached several times before the next one, what changes with time is among its own approaches: these, less the mean of
+/// their side, in the order of the rows, depend on each other. A drift of all is one of the runs.
+fn one_after_the_other(of: &Approaches, unit: &str) -> Vec<Check> {
+    let in_steps = |rows: &Vec<Vec<usize>>| {
+        let all = || rows.iter().flatten();
+        let range = all().max().zip(all().min()).map_or(0, |(last, first)| last + 1 - first);
+        range == all().count()
+    };
+    if !of.rows.iter().all(in_steps) {
+        return Vec::new();
+    }
+    let of_target = |(rows, sides): (&Vec<Vec<usize>>, &Vec<Vec<f64>>)| {
+        let mut all: Vec<(usize, f64)> = Vec::new();
+        for (rows, deviations) in rows.iter().zip(sides) {
+            let middle = mean(deviations);
+            all.extend(rows.iter().zip(deviations).map(|(row, deviation)| (*row, deviation - middle)));
+        }
+        all.sort_by_key(|(row, _)| *row);
+        all.into_iter().map(|(_, left)| left).collect::<Vec<f64>>()
+    };
+    let left: Vec<Vec<f64>> = of.rows.iter().zip(&of.deviations).map(of_target).collect();
+    let names: Vec<String> = of.targets.iter().map(|target| format!("target {target}, approach")).collect();
+    let series: Vec<(&str, &[f64])> = names.iter().map(String::as_str).zip(left.iter().map(Vec::as_slice)).collect();
+    let mut checks = in_order("the approaches of a target", &series, unit);
+    checks.retain(|check| check.test == Test::Order);
     checks
 }
 

@@ -31,6 +31,11 @@ fn outcome(separator: Separator, columns: &[(&str, Vec<f64>)]) -> Outcome {
     separator.separate(&Points { columns: columns.collect(), ..Points::default() }).unwrap()
 }
 
+fn positioning(columns: &[(&str, Vec<f64>)]) -> Outcome {
+    let config = PositioningConfig { axis: "X".into(), rotary: false, scale_std_ppm: 0.0 };
+    outcome(config.check(&Context { folder: std::path::Path::new("."), rig: None }).unwrap(), columns)
+}
+
 fn number(outcome: &Outcome, symbol: &str) -> (f64, f64, [f64; 2]) {
     let value = outcome.values.iter().find(|value| value.symbol == symbol).unwrap();
     (value.value, value.std().unwrap(), value.interval_95().unwrap())
@@ -76,8 +81,7 @@ impl Axis {
                 }
             }
         }
-        let config = PositioningConfig { axis: "X".into(), rotary: false, scale_std_ppm: 0.0 };
-        outcome(config.check(&Context { folder: std::path::Path::new("."), rig: None }).unwrap(), &columns)
+        positioning(&columns)
     }
 
     fn truth_um(&self, targets_mm: &[f64], symbol: &str) -> f64 {
@@ -196,6 +200,36 @@ fn a_warm_up_is_in_the_interval_of_the_reversal_value() {
     );
     for [held, said, refuted] in cases {
         assert!(held >= least && said <= 1 + trials / 10 && refuted <= 1 + trials / 20, "{cases:?}");
+    }
+}
+
+/// Each target five times from both sides before the next one: what drifts lies along the travel, and is in accuracy as in systematic deviations.
+#[test]
+fn a_drift_in_step_order_is_in_the_interval_of_accuracy() {
+    let targets: Vec<f64> = (0..11).map(|index| 50.0 * f64::from(index)).collect();
+    let trials = crate::trials::trials(24);
+    let axis = Axis { noise_um: 0.4, of_run_um: 0.0, of_side_um: 0.0, backlash_um: 1.0 };
+    for drift_um in [0.1, 0.3] {
+        let mut chance = Chance(ChaCha8Rng::seed_from_u64(3));
+        let held = (0..trials).filter(|_| {
+            let mut columns = [("target_mm", Vec::new()), ("deviation_um", Vec::new()), ("direction", Vec::new())];
+            for target in &targets {
+                for number in 0..10 {
+                    let side = if number % 2 == 0 { 1.0 } else { -1.0 };
+                    let drift = drift_um * columns[0].1.len() as f64;
+                    columns[0].1.push(*target);
+                    columns[1].1.push(axis.mean_um(*target, side) + drift + 0.4 * chance.normal());
+                    columns[2].1.push(side);
+                }
+            }
+            let found = positioning(&columns);
+            let (_, _, [low, high]) = number(&found, "A");
+            let is_refuted = found.values.iter().any(|value| value.symbol == "A" && value.refuted_by.is_some());
+            is_refuted || (low..=high).contains(&axis.truth_um(&targets, "A"))
+        });
+        let held = held.count();
+        println!("{drift_um} µm an approach: held {held} of {trials}");
+        assert!(held >= fewest(trials, [20, 24], 0.93), "{drift_um}: {held} of {trials}");
     }
 }
 
