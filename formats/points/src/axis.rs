@@ -1,6 +1,6 @@
 //! Coordinates of a coordinate measuring machine as angle, distance and height about the axis of the part, which is found from them.
 
-use nalgebra::{Matrix5, Vector3, Vector5};
+use nalgebra::{Matrix3, Matrix5, Vector3, Vector5};
 use runout_core::points::Column;
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -23,6 +23,9 @@ const STEPS: usize = 50;
 const SHOWS_TILT: f64 = 0.1;
 /// Another direction that leaves less than so many times the least is as likely.
 const LIKELY: f64 = 3.0;
+/// Points that are so much flatter than they are wide lie in a plane, and those that a circle leaves so small a share of its radius are on one.
+const FLAT: f64 = 0.02;
+const ROUND: f64 = 0.01;
 /// Fewest points: as many as parameters, and one.
 const FEWEST: usize = 6;
 
@@ -50,6 +53,12 @@ pub(crate) fn about(points_mm: &[[f64; 3]], axis: Option<Axis>) -> Result<About,
     let mut found: Vec<Fitted> = candidates.into_iter().filter_map(|axis| fit(points_mm, axis)).collect();
     found.sort_by(|one, other| one.rms_mm.total_cmp(&other.rms_mm));
     let best = found.first().ok_or("they lie on no circle and no cylinder")?;
+    // Through points near a plane there is a cylinder along it too, as large as one likes.
+    let flat = across_plane(points_mm).filter(|_| axis.is_none());
+    let is_circle = |one: &&Fitted| flat == Some(one.axis) && one.rms_mm < ROUND * one.parameters[4];
+    if let Some(circle) = found.iter().find(is_circle) {
+        return Ok(circle.placed(points_mm));
+    }
     if let Some(other) = found.get(1).filter(|other| other.rms_mm < LIKELY * best.rms_mm) {
         return Err(format!(
             "an axis near {:?} leaves {:.4} mm, one near {:?} {:.4} mm: `axis` in [load] says which one it is",
@@ -58,6 +67,19 @@ pub(crate) fn about(points_mm: &[[f64; 3]], axis: Option<Axis>) -> Result<About,
         .to_lowercase());
     }
     Ok(best.placed(points_mm))
+}
+
+/// The direction nearest to the normal of the plane in which points lie.
+fn across_plane(points_mm: &[[f64; 3]]) -> Option<Axis> {
+    let points = || points_mm.iter().map(|point| Vector3::from(*point));
+    let middle = points().sum::<Vector3<f64>>() / points_mm.len() as f64;
+    let spread: Matrix3<f64> = points().map(|point| (point - middle) * (point - middle).transpose()).sum();
+    let principal = spread.symmetric_eigen();
+    let mut order = [0, 1, 2];
+    order.sort_by(|one, other| principal.eigenvalues[*one].total_cmp(&principal.eigenvalues[*other]));
+    let is_flat = principal.eigenvalues[order[0]] < FLAT * FLAT * principal.eigenvalues[order[1]];
+    let normal = principal.eigenvectors.column(order[0]).abs();
+    is_flat.then(|| [Axis::X, Axis::Y, Axis::Z][normal.imax()])
 }
 
 /// Coordinates with the axis as the third.
@@ -211,5 +233,31 @@ mod tests {
             found.remark
         );
         assert!(about(&circle[..4], None).is_err());
+    }
+
+    /// Heights that scatter, and a plane out of level: a cylinder of metres lies along the plane too, and leaves as little.
+    #[test]
+    fn one_circle_of_a_measuring_machine_is_a_circle() {
+        for (scatter_mm, slope) in [(1e-3, 0.0), (0.0, 1e-4), (1e-3, 1e-3)] {
+            let circle: Vec<[f64; 3]> = (0..90)
+                .map(|index| (f64::from(index), f64::from(index).to_radians() * 4.0))
+                .map(|(index, angle)| {
+                    let x = 3.0 + 20.0 * angle.cos();
+                    [
+                        x,
+                        20.0 * angle.sin() + 1e-3 * (index * 1.7).cos(),
+                        7.0 + slope * x + scatter_mm * (index * 2.3).sin(),
+                    ]
+                })
+                .collect();
+            let found = about(&circle, None).unwrap();
+            assert!(found.remark.contains("near z"), "{scatter_mm} {slope}: {}", found.remark);
+        }
+        // A strip of a cylinder along x is as flat.
+        let strip: Vec<[f64; 3]> = (0..90)
+            .map(|index| (f64::from(index % 9) - 4.0, f64::from(index / 9)))
+            .map(|(across, along)| [10.0 * along, across, 0.5 * across * across / 200.0])
+            .collect();
+        assert!(!about(&strip, None).is_ok_and(|found| found.remark.contains("near z")));
     }
 }
