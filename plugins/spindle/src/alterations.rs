@@ -29,6 +29,8 @@ pub struct Alterations {
     pub clampings: Vec<usize>,
     /// As the rig declares them, one a sensor: ±1.
     pub declared_signs: Vec<f64>,
+    /// Declared over true radius of the part, less 1.
+    pub curvature: f64,
     /// Whether the part turns the other way than declared.
     pub rotation_reversed: bool,
     /// Whether the part's angles count the other way than declared.
@@ -209,6 +211,9 @@ const LARGEST_SHARE: f64 = 0.95;
 /// Squared widths that a spot may have: to 30 mm, and below 0 as far as a fit may go on its way to a small one.
 const SPOTS_MM2: std::ops::RangeInclusive<f64> = -1.0..=900.0;
 
+/// Curvatures of the part over the declared one: from mm that are cm to inches that are mm.
+const CURVATURES: std::ops::RangeInclusive<f64> = 0.01..=100.0;
+
 /// By how much an angle may be off: 45° and a little. Beyond, it is another place.
 const FARTHEST_RAD: f64 = 0.8;
 
@@ -256,8 +261,12 @@ impl Alterations {
             let angles = [setup.part_rad, setup.sensors_rad];
             angles.iter().all(|angle| angle.abs() < FARTHEST_RAD) && setup.motion > -0.95 && steepness(setup) < 0.5
         };
+        let is_round = CURVATURES.contains(&(1.0 + self.curvature));
         let numbers = self.sensors.iter().flat_map(|s| [s.quadratic_per_um, s.cubic_per_um2, s.creep_um, s.z_mm]);
-        self.sensors.iter().all(sensor) && self.setups.iter().all(setup) && numbers.into_iter().all(f64::is_finite)
+        is_round
+            && self.sensors.iter().all(sensor)
+            && self.setups.iter().all(setup)
+            && numbers.into_iter().all(f64::is_finite)
     }
 }
 

@@ -45,6 +45,10 @@ pub(crate) fn lines(selection: &Selection, alterations: &Alterations, key: RigKe
                 _ => bent.into(),
             }
         }
+        RigKey::PartRadius => {
+            let radius_mm = rounded(rig.part_radius_mm / (1.0 + alterations.curvature), DIGITS);
+            vec![format!("part_radius_mm = {radius_mm:?}")]
+        }
     }
 }
 

@@ -2,7 +2,6 @@
 
 use crate::{
     layout::Layout,
-    selection::Selection,
     solve::{Blocks, Operators, Propagation, Readings, leak, whitening},
 };
 
@@ -19,9 +18,9 @@ pub(super) struct Weighed {
 }
 
 impl Weighed {
-    pub(super) fn new(layout: &Layout, selection: &Selection, mut readings: Readings) -> Self {
+    pub(super) fn new(layout: &Layout, mut readings: Readings) -> Self {
         let before = variances(&readings);
-        leak::widen(layout, selection.rig.part_radius_mm, &mut readings);
+        leak::widen(layout, &mut readings);
         let after = variances(&readings);
         let weights = whitening(&readings);
         let floor = weights.as_ref().map_or_else(Vec::new, |weights| floor(layout, &readings, weights));

@@ -20,6 +20,7 @@ impl Alterations {
             swapped_in: Vec::new(),
             clampings: (0..count(|reading| reading.setup)).collect(),
             declared_signs: layout.declared_signs(),
+            curvature: 0.0,
             rotation_reversed: false,
             part_angles_reversed: false,
             sensor_angles_reversed: false,

@@ -16,6 +16,7 @@ mod correct;
 mod cross_talk;
 mod even_order_motion;
 mod mistakes;
+mod part_radius;
 mod pattern;
 mod predicted;
 mod reversal_angle;
@@ -249,6 +250,8 @@ pub enum RigKey {
     PartAngle,
     /// `sensors_deg` of a setup.
     SensorsAngle,
+    /// `part_radius_mm`.
+    PartRadius,
 }
 
 /// A parameter with its unit and usual size.
@@ -297,6 +300,7 @@ pub fn all() -> Vec<Arc<dyn SpindleEffect>> {
         Arc::new(thermal_drift::ThermalDrift),
         Arc::new(even_order_motion::EvenOrderMotion),
         Arc::new(second_order_geometry::SecondOrderGeometry),
+        Arc::new(part_radius::PartRadius),
     ];
     all.extend(ChannelResponse::all().map(|response| -> Arc<dyn SpindleEffect> { Arc::new(response) }));
     all.push(Arc::new(unlike_shares::ProbeSpot));

@@ -6,7 +6,7 @@ use super::correct::Curve;
 use crate::{
     alterations::Alterations,
     layout::{FirstOrder, Layout, SeenPattern, UM_PER_MM_URAD},
-    solve::{Estimate, Readings},
+    solve::{Estimate, Readings, SecondOrder},
 };
 
 /// Harmonics of Re Σ c e^{−inΦ}, `[order][reading]` from order 0, of what each reading is made of.
@@ -31,6 +31,7 @@ pub struct Predicted<'a> {
     pub readings: Vec<Complex64>,
     /// How the part changes along z, in µm/mm; 0 where only one section is seen.
     pub along_z: Vec<Complex64>,
+    estimate: &'a Estimate,
 }
 
 impl<'a> Predicted<'a> {
@@ -39,7 +40,7 @@ impl<'a> Predicted<'a> {
     pub(crate) fn new(
         layout: &'a Layout,
         alterations: &'a Alterations,
-        estimate: &Estimate,
+        estimate: &'a Estimate,
         displacements: &'a Readings,
     ) -> Self {
         let (count, readings) = (layout.readings.len(), &displacements.mean);
@@ -54,6 +55,7 @@ impl<'a> Predicted<'a> {
             tilt: vec![Complex64::ZERO; readings.len()],
             readings: readings.clone(),
             along_z: vec![Complex64::ZERO; readings.len()],
+            estimate,
         };
         let position = |wanted: Quantity| layout.unknowns.iter().position(|known| *known == wanted);
         let motions: Vec<(usize, [f64; 4])> = (layout.unknowns.iter().enumerate())
@@ -142,6 +144,17 @@ impl<'a> Predicted<'a> {
             .map(|reading| (reading.section, reading.lever_mm - here))
             .filter(|(_, distance)| distance.abs() > 1e-3)
             .min_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))
+    }
+
+    /// What exact geometry adds to linear readings of a part whose curvature is so many times that of the layout's, in µm.
+    pub(crate) fn beyond_linear(&self, curvature: f64) -> Vec<Complex64> {
+        let mut layout = self.layout.clone();
+        layout.part_radius_mm /= curvature;
+        let first = self.part.iter().skip(layout.readings.len()).take(layout.readings.len());
+        let eccentricity_um = first.map(|part| part.norm()).fold(0.0, f64::max);
+        let mut beyond = self.nothing();
+        SecondOrder::new(&layout, self.samples_per_rev, eccentricity_um).excess(self.estimate, &mut beyond);
+        beyond
     }
 
     /// Nothing, for readings that an effect leaves alone.

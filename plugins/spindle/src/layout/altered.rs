@@ -13,6 +13,7 @@ impl Layout {
     pub fn altered(&self, alterations: &Alterations) -> Self {
         let mut layout = self.clone();
         layout.odd_motion &= !alterations.even_order_motion;
+        layout.part_radius_mm /= 1.0 + alterations.curvature;
         if alterations.rotation_reversed {
             layout.direction = -layout.direction;
         }
@@ -53,7 +54,7 @@ impl Layout {
                 reading.lever_mm += sensor.z_mm;
             }
             reading.motion_ratio *= (1.0 + setup.motion) * (1.0 - sensor.bracket_share);
-            reading.spot_rad2 = sensor.spot_mm2 / (self.part_radius_mm * self.part_radius_mm);
+            reading.spot_rad2 = sensor.spot_mm2 / (layout.part_radius_mm * layout.part_radius_mm);
         }
         for index in 0..layout.readings.len() {
             let reading = &layout.readings[index];

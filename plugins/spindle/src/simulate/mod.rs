@@ -47,10 +47,10 @@ pub use config::{
 pub use effects::{
     AsynchronousLine, AxialMotion, Backlash, BracketMotion, ChannelDelay, ChannelGhost, ChannelSkew, ChuckForm,
     ClampingForm, CrossTalk, Dent, Effect, ElectricalRunOut, EvenOrderMotion, FilterAttenuation, IndexOffset, Lobes,
-    LostSamples, PartAngleSign, PartEccentricity, ProbeSpot, ReversalAngle, RotationReversed, SecondOrderGeometry,
-    SensorAngle, SensorAxialPosition, SensorGain, SensorLine, SensorNonlinearity, SensorSign, SensorsAngle,
-    SensorsIdentical, SensorsSwapped, SetupGain, SetupMotionChange, SetupRepeated, SetupsSwapped, SlippedProbe,
-    SpeedRipple, Step, ThermalDrift, TurnRatio,
+    LostSamples, PartAngleSign, PartEccentricity, PartRadius, ProbeSpot, ReversalAngle, RotationReversed,
+    SecondOrderGeometry, SensorAngle, SensorAxialPosition, SensorGain, SensorLine, SensorNonlinearity, SensorSign,
+    SensorsAngle, SensorsIdentical, SensorsSwapped, SetupGain, SetupMotionChange, SetupRepeated, SetupsSwapped,
+    SlippedProbe, SpeedRipple, Step, ThermalDrift, TurnRatio,
 };
 pub use recording::SpindleRecording;
 

@@ -19,11 +19,11 @@ use crate::layout::{Layout, View};
 const MOTION_ORDERS: usize = 256;
 
 /// Adds the covariance of what lost orders carry into others to that of the readings.
-pub(crate) fn widen(layout: &Layout, part_radius_mm: f64, readings: &mut Readings) {
+pub(crate) fn widen(layout: &Layout, readings: &mut Readings) {
     if readings.covariance.is_none() && readings.scatter.is_none() {
         return;
     }
-    let carried = Carried::new(layout, part_radius_mm, readings);
+    let carried = Carried::new(layout, readings);
     let faces = layout.readings.iter().any(|reading| reading.view == View::Axial);
     if !faces && carried.lost.iter().all(|lost| !lost) {
         return;
@@ -64,7 +64,7 @@ struct Carried<'a> {
 }
 
 impl<'a> Carried<'a> {
-    fn new(layout: &'a Layout, part_radius_mm: f64, readings: &Readings) -> Self {
+    fn new(layout: &'a Layout, readings: &Readings) -> Self {
         let sections = layout.readings.iter().map(|reading| reading.section + 1).max().unwrap_or(0);
         let systems = layout.systems(readings.max_order);
         let is_lost =
@@ -81,7 +81,7 @@ impl<'a> Carried<'a> {
         let orders = 0..=readings.max_order;
         Self {
             layout,
-            radius_um: 1e3 * part_radius_mm,
+            radius_um: 1e3 * layout.part_radius_mm,
             lost: orders.clone().map(is_lost).collect(),
             squares: orders
                 .clone()

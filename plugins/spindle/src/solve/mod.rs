@@ -26,6 +26,6 @@ pub(crate) use projection::projection;
 pub(crate) use propagation::Propagation;
 pub(crate) use readings::{RESAMPLING, Readings};
 pub(crate) use residual::{by_reading, judged_residual};
-pub(crate) use second_order::OVERSAMPLING;
+pub(crate) use second_order::{OVERSAMPLING, SecondOrder};
 pub(crate) use solution::Solver;
 pub(crate) use weights::{smooth_by_order, whitening};

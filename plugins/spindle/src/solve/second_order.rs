@@ -60,16 +60,16 @@ pub(crate) struct SecondOrder<'a> {
 }
 
 impl<'a> SecondOrder<'a> {
-    pub(crate) fn new(layout: &'a Layout, part_radius_mm: f64, samples_per_rev: usize, eccentricity_um: f64) -> Self {
-        Self::finer(1, layout, part_radius_mm * 1e3, samples_per_rev, eccentricity_um)
+    pub(crate) fn new(layout: &'a Layout, samples_per_rev: usize, eccentricity_um: f64) -> Self {
+        Self::finer(1, layout, samples_per_rev, eccentricity_um)
     }
 
-    fn finer(finer: usize, layout: &'a Layout, radius_um: f64, samples_per_rev: usize, eccentricity_um: f64) -> Self {
+    fn finer(finer: usize, layout: &'a Layout, samples_per_rev: usize, eccentricity_um: f64) -> Self {
         let samples_per_rev = finer * samples_per_rev;
         let turns = (0..samples_per_rev).map(|step| step as f64 / samples_per_rev as f64);
         Self {
             layout,
-            radius_um,
+            radius_um: 1e3 * layout.part_radius_mm,
             eccentricity_um,
             finer,
             turn: Fourier::new(samples_per_rev),
@@ -93,7 +93,7 @@ impl<'a> SecondOrder<'a> {
         let count = layout.readings.len();
         let max_order = excess.len() / count - 1;
         if self.finer == 1 && self.folded_um(estimate, max_order) > FOLDED_UM {
-            *self = Self::finer(2, layout, self.radius_um, self.turn.length(), self.eccentricity_um);
+            *self = Self::finer(2, layout, self.turn.length(), self.eccentricity_um);
         }
         let samples = self.turn.length();
         self.tabulate(estimate, max_order);

@@ -63,11 +63,11 @@ impl Solver<'_> {
         let mut readings = Readings::gather(self.selection, self.layout, station)?;
         weights::smooth_by_order(&mut readings);
         if self.second_order {
-            leak::widen(self.layout, self.selection.rig.part_radius_mm, &mut readings);
+            leak::widen(self.layout, &mut readings);
         }
         let operators = method(&readings);
         let (estimate, linear) = self.iterate(&readings, &operators, |_, _| {});
-        let beyond = self.eccentricity_um(&readings) > far_off::FAR_OFF * 1e3 * self.selection.rig.part_radius_mm;
+        let beyond = self.eccentricity_um(&readings) > far_off::FAR_OFF * 1e3 * self.layout.part_radius_mm;
         if self.second_order && beyond || self.couples(&readings) && estimate.is_unsettled() {
             return Err(self.unsettled(station, &readings, &estimate));
         }
@@ -93,7 +93,7 @@ impl Solver<'_> {
     fn carried(&self, readings: &Readings, separation: &Separation) -> Option<String> {
         let width = separation.unknowns.len();
         let eccentricity_um = self.eccentricity_um(readings);
-        let share = eccentricity_um / (1e3 * self.selection.rig.part_radius_mm);
+        let share = eccentricity_um / (1e3 * self.layout.part_radius_mm);
         let sees = |wanted| self.layout.unknowns.contains(&wanted);
         // What lost orders carry is in the readings' uncertainty.
         if sees(Quantity::X) && sees(Quantity::Y) {
@@ -133,14 +133,9 @@ impl Solver<'_> {
     ) -> (Estimate, Vec<Complex64>) {
         let mut estimate = self.estimate(operators, &readings.mean, readings.max_order);
         let mut linear = readings.mean.clone();
-        let mut geometry = self.second_order.then(|| {
-            SecondOrder::new(
-                self.layout,
-                self.selection.rig.part_radius_mm,
-                readings.samples_per_rev,
-                self.eccentricity_um(readings),
-            )
-        });
+        let mut geometry = self
+            .second_order
+            .then(|| SecondOrder::new(self.layout, readings.samples_per_rev, self.eccentricity_um(readings)));
         let mut excess = vec![Complex64::ZERO; readings.mean.len()];
         let rms = |squares: f64| (0.5 * squares / readings.count as f64).sqrt();
         let coupled = self.couples(readings);
@@ -177,7 +172,7 @@ impl Solver<'_> {
     /// Whether the eccentricity takes the highest order to the orders beside it by so much that they do not settle one by
     /// one.
     fn couples(&self, readings: &Readings) -> bool {
-        let share = self.eccentricity_um(readings) / (1e3 * self.selection.rig.part_radius_mm);
+        let share = self.eccentricity_um(readings) / (1e3 * self.layout.part_radius_mm);
         self.second_order && share * readings.max_order as f64 > COUPLED
     }
 

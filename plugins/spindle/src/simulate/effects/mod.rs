@@ -23,7 +23,7 @@ pub use sensors::{
     FilterAttenuation, SensorAngle, SensorAxialPosition, SensorGain, SensorLine, SensorNonlinearity, ThermalDrift,
 };
 pub use setups::{LostSamples, PartEccentricity, ReversalAngle, SensorsAngle, SetupMotionChange, TurnRatio};
-pub use spindle::{AsynchronousLine, AxialMotion, EvenOrderMotion, SecondOrderGeometry, SpeedRipple};
+pub use spindle::{AsynchronousLine, AxialMotion, EvenOrderMotion, PartRadius, SecondOrderGeometry, SpeedRipple};
 pub use strangers::{Backlash, Dent, SlippedProbe, Step};
 
 use super::world::World;
@@ -48,6 +48,8 @@ pub enum Effect {
     PartEccentricity(PartEccentricity),
     /// Says that readings follow the exact geometry, which they do unless `geometry = "linear"`.
     SecondOrderGeometry(SecondOrderGeometry),
+    /// The part has another radius than stated.
+    PartRadius(PartRadius),
     /// The synchronous motion is larger or smaller in a setup.
     SetupMotionChange(SetupMotionChange),
     /// Random synchronous motion of even orders in addition.
@@ -151,6 +153,7 @@ impl Effect {
             Self::PartAngleSign(effect) => effect,
             Self::PartEccentricity(effect) => effect,
             Self::SecondOrderGeometry(effect) => effect,
+            Self::PartRadius(effect) => effect,
             Self::SetupMotionChange(effect) => effect,
             Self::EvenOrderMotion(effect) => effect,
             Self::SensorLine(effect) => effect,

@@ -38,6 +38,32 @@ impl Acts for SecondOrderGeometry {
     }
 }
 
+/// True radius of the part = stated radius · (1 + this).
+#[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PartRadius {
+    /// −0.5 where a diameter is stated for the radius.
+    pub relative_error: f64,
+    /// Always false: what the separation is to know is declared in the pipeline.
+    #[serde(default)]
+    pub declared: bool,
+}
+
+impl Acts for PartRadius {
+    fn declared(&self) -> bool {
+        self.declared
+    }
+
+    fn apply(&self, world: &mut World, _index: usize) -> Result<(), Fault> {
+        check::finite("relative_error", self.relative_error)?;
+        if self.relative_error <= -1.0 {
+            return Err(Fault::at("relative_error", "expected more than −1: a radius is above 0"));
+        }
+        world.radius_um *= 1.0 + self.relative_error;
+        Ok(())
+    }
+}
+
 /// Orders 2, 4, … with amplitudes falling as 1/order.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]

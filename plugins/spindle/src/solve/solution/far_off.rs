@@ -27,13 +27,13 @@ impl Solver<'_> {
     /// By how much the variance of each order from 1 is larger than order by order, where the eccentricity couples the orders: noise is added to the
     /// readings, they are solved again, and what changes is compared with what each order's own solution makes of that noise. `None` where orders
     /// hardly couple, or the noise is not known.
-    pub(super) fn coupled_noise(
+    pub(crate) fn coupled_noise(
         &self,
         readings: &Readings,
         operators: &Operators,
         estimate: &Estimate,
     ) -> Option<Vec<f64>> {
-        let share = self.eccentricity_um(readings) / (1e3 * self.selection.rig.part_radius_mm);
+        let share = self.eccentricity_um(readings) / (1e3 * self.layout.part_radius_mm);
         let setups = readings.covariance.as_ref()?;
         if !self.second_order || share * (readings.max_order as f64) < STRONG {
             return None;
@@ -76,7 +76,7 @@ impl Solver<'_> {
 
     /// Where exact geometry does not settle.
     pub(super) fn unsettled(&self, station: &Station, readings: &Readings, estimate: &Estimate) -> Error {
-        let (eccentricity_um, radius_mm) = (self.eccentricity_um(readings), self.selection.rig.part_radius_mm);
+        let (eccentricity_um, radius_mm) = (self.eccentricity_um(readings), self.layout.part_radius_mm);
         let ratio = format!("an eccentricity of {eccentricity_um:.0} µm on a radius of {radius_mm} mm");
         let check = "check part_radius_mm and the unit of the readings";
         let (problem, help) = if eccentricity_um > FAR_OFF * 1e3 * radius_mm {
@@ -99,7 +99,7 @@ impl Solver<'_> {
 
     /// What the stated uncertainty of order by order lacks where the eccentricity is large.
     pub(super) fn far_off_centre(&self, readings: &Readings) -> Option<String> {
-        let (eccentricity_um, radius_mm) = (self.eccentricity_um(readings), self.selection.rig.part_radius_mm);
+        let (eccentricity_um, radius_mm) = (self.eccentricity_um(readings), self.layout.part_radius_mm);
         let is_large = self.second_order && eccentricity_um > LARGE * 1e3 * radius_mm;
         is_large.then(|| {
             // Stations that are alike are to say the same.

@@ -1,7 +1,10 @@
 //! Readings in another unit than declared.
 
 use super::{six, warned};
-use crate::campaigns::averaged;
+use crate::{
+    campaigns::{averaged, campaign, two_sections},
+    diagnose::diagnosed,
+};
 
 /// One channel a thousand times smaller or larger than the others, or all of them.
 #[test]
@@ -32,4 +35,35 @@ fn readings_in_another_unit_are_said_by_run() {
     // Ten times the eccentricity is no unit, nor is a tenth.
     assert!(!said(&|_| 10.0).contains("unit"));
     assert!(!said(&|_| 0.1).contains("unit"));
+}
+
+/// The diameter that is declared for the radius: what exact geometry adds at order 2 is half of it, (0.2 mm)²/4R = 0.33 µm, and carries orders of form into
+/// those beside them. 8 µm off centre it is nothing, and nothing is said.
+#[test]
+fn a_diameter_for_the_radius_is_found_off_centre() {
+    let of_radius = |eccentricity_um: f64| {
+        let mut config = campaign(4, r#"[{"plugin":"part-radius","relative_error":-0.5}]"#);
+        config.rig.part_radius_mm = 60.0;
+        config.eccentricity.offset_um = eccentricity_um;
+        config
+    };
+    let three_angles = of_radius(200.0);
+    let mut reversal = of_radius(200.0);
+    reversal.rig.setups.truncate(2);
+    (reversal.rig.setups[1].part_deg, reversal.rig.setups[1].sensors_deg) = (180.0, 180.0);
+    let mut one_setup = of_radius(200.0);
+    one_setup.rig.setups.truncate(1);
+    one_setup.rig.sensors = two_sections(&[0.0, 99.844, 202.5, 310.0]);
+    for config in [three_angles, reversal, one_setup] {
+        let (found, [before, after]) = diagnosed(&config);
+        println!("simulated: form error {before:.4} → {after:.4} µm, {:?}", found.diagnosis.added);
+        let [added] = &found.diagnosis.added[..] else { panic!("{:?}", found.diagnosis.added) };
+        let curvature = &added.parameters[0];
+        assert_eq!((added.effect.as_str(), added.confounded_with.len()), ("part-radius", 0), "{added:?}");
+        assert!((curvature.value - 1.0).abs() < 4.0 * curvature.std.unwrap() && curvature.std.unwrap() < 0.2);
+        let key = added.change.as_deref().unwrap().strip_prefix("part_radius_mm = ").unwrap();
+        assert!((key.parse::<f64>().unwrap() - 30.0).abs() < 5.0 && after < 0.5 * before, "{key}: {before} → {after}");
+    }
+    let centred = diagnosed(&of_radius(8.0)).0.diagnosis;
+    assert!(centred.added.is_empty() && centred.blind_to.iter().all(|blind| blind.effect != "part-radius"));
 }
