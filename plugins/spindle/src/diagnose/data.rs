@@ -116,6 +116,9 @@ pub(crate) struct StationData {
     floor: Vec<f64>,
     /// Share of the readings' variance that lost orders carry into an order from 1.
     carried: Vec<f64>,
+    /// The highest order that says something of effects, which change what readings have: above it there is noise only, which each model fits in its own
+    /// way, so that chance would decide between them.
+    pub signal_orders: usize,
     /// All of it where motion is no longer assumed to be odd, and even orders are lost.
     freed: Option<Box<Weighed>>,
     /// What the single turns show.
@@ -202,12 +205,27 @@ impl StationData {
         let held_out = held_out.map(|readings| Readings { scatter: None, ..readings });
         let freed = layout.assumes_odd_motion().then(|| {
             let freed = Alterations { even_order_motion: true, ..Alterations::none(layout) };
-            Box::new(Weighed::new(&layout.altered(&freed), selection, readings.clone()))
+            Box::new(Weighed::new(&layout.altered(&freed), readings.clone()))
         });
-        let Weighed { readings, weights, floor, carried } = Weighed::new(layout, selection, readings);
+        let Weighed { readings, weights, floor, carried } = Weighed::new(layout, readings);
         let name = fit.name.clone();
         let recorded = None;
-        Ok(Self { name, part, readings, held_out, weights, floor, carried, freed, seen, leaks, creeps, recorded })
+        let signal_orders = signal_orders(&readings, weights.as_deref(), &floor);
+        Ok(Self {
+            name,
+            part,
+            readings,
+            held_out,
+            weights,
+            floor,
+            carried,
+            signal_orders,
+            freed,
+            seen,
+            leaks,
+            creeps,
+            recorded,
+        })
     }
 
     /// Effects as they act on the turns fitted, or on those held out: a creep differs between setups and slows down.
@@ -238,6 +256,7 @@ impl StationData {
     /// Leaves out the orders above `max_order`.
     fn truncate(&mut self, max_order: usize) {
         self.readings.truncate(max_order);
+        self.signal_orders = self.signal_orders.min(max_order);
         self.held_out.iter_mut().for_each(|held_out| held_out.truncate(max_order));
         self.freed.iter_mut().for_each(|freed| freed.readings.truncate(max_order));
     }
@@ -301,4 +320,23 @@ impl StationData {
         let each = (0..self.readings.max_order).map(|index| squares.get(index).map_or(1.0, |square| square.sqrt()));
         each.collect()
     }
+}
+
+/// Patterns of single orders are looked for below this one, whatever readings have there.
+const LOW_ORDERS: usize = 16;
+/// Standard deviations by which the mean square of an order's weighted readings is above that of noise where it is no noise: noise alone is in one of
+/// 10 000 orders of two readings, and more seldom of several.
+const STANDING_OUT: f64 = 7.0;
+
+/// The highest order at which readings stand out from their noise; all orders where that is not known.
+fn signal_orders(readings: &Readings, weights: Option<&[Blocks]>, floor: &[f64]) -> usize {
+    let Some(weights) = weights else { return readings.max_order };
+    let count = readings.count as f64;
+    let stands_out = |order: &usize| {
+        let weighted = weights[order - 1].times(readings.order(*order), 1);
+        let square = weighted.iter().map(Complex64::norm_sqr).sum::<f64>() / (count * floor[order - 1]);
+        square > 1.0 + STANDING_OUT / count.sqrt()
+    };
+    let highest = (1..=readings.max_order).rev().find(stands_out).unwrap_or(0);
+    highest.max(LOW_ORDERS).min(readings.max_order)
 }

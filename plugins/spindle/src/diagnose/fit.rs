@@ -183,7 +183,7 @@ impl SpindleFit {
             })
         };
         let lowest = if on_axis { 1 } else { 2 };
-        OpenWithinBound { harmonics: (lowest..=solved.corrected.max_order).map(harmonic).collect() }
+        OpenWithinBound { harmonics: (lowest..=solved.signal_orders).map(harmonic).collect() }
     }
 
     /// Without what is mixed with it.
@@ -215,7 +215,7 @@ impl Fit for SpindleFit {
             let columns = partials.iter().enumerate().map(|(parameter, partial)| {
                 let mut column = Vec::new();
                 // What the model predicts more of, the residual has less of.
-                project_some(&solved.whitened, partial, solved.corrected.count, |value| {
+                project_some(solved.traced(), partial, solved.corrected.count, |value| {
                     column.extend([-value.re, -value.im]);
                 });
                 column.extend(data.creeps.iter().map(|(sensor, _, std)| {

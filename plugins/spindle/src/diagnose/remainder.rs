@@ -24,20 +24,19 @@ pub(super) fn remainder(shared: &Shared, stations: &[Solved], layout: &Layout, a
     let (mut held_readings, mut disturbed) = (0, 0.0);
     for (solved, data) in stations.iter().zip(&shared.data) {
         let count = solved.corrected.count;
-        project(&solved.whitened, &solved.linear, count, |_, values| {
+        project(solved.traced(), &solved.linear, count, |_, values| {
             residual.extend(values.iter().flat_map(|value| [value.re, value.im]));
         });
         let beside = data.beside_averages(alterations);
         dof += beside.len();
         residual.extend(beside);
         stretches.push(residual.len() - stretches.iter().sum::<usize>());
-        for (index, operator) in solved.operators.orders.iter().enumerate() {
-            let freedom = 2 * count.saturating_sub(operator.rank);
-            disturbed += freedom as f64 * data.carried(index + 1, alterations);
+        for order in 1..=solved.signal_orders {
+            dof += solved.freedom(order);
+            disturbed += solved.freedom(order) as f64 * data.carried(order, alterations);
         }
         let level = &solved.residual;
         if level.dof > 0 {
-            dof += level.dof;
             squares += level.rms_um.powi(2) * count as f64;
             expected += level.expected_rms_um.powi(2) * count as f64;
         }
@@ -113,8 +112,10 @@ fn held_out(data: &StationData, solved: &Solved, layout: &Layout, alterations: &
             let recorded = alterations.recorded(layout, order, &left);
             squares += recorded.iter().zip(&solved.slopes).map(|(left, slope)| (left * slope).norm_sqr()).sum::<f64>();
         }
-        let weighted = data.weights_of(order, layout, alterations, &solved.slopes).times(&left, 1);
-        chi2 += weighted.iter().map(Complex64::norm_sqr).sum::<f64>() / solved.floor_std[order - 1].powi(2);
+        if order <= solved.signal_orders {
+            let weighted = data.weights_of(order, layout, alterations, &solved.slopes).times(&left, 1);
+            chi2 += weighted.iter().map(Complex64::norm_sqr).sum::<f64>() / solved.floor_std[order - 1].powi(2);
+        }
     }
     let expected = held_out_expected(solved, &held);
     Some(HeldOut { chi2, squares, expected })

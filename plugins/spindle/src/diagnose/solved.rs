@@ -33,6 +33,8 @@ pub(super) struct Solved {
     pub linear: Vec<Complex64>,
     /// W (I − A P) of each order from 1, over the noise of a real degree of freedom.
     pub whitened: Vec<Vec<Complex64>>,
+    /// The highest order that [says something of effects](StationData::signal_orders).
+    pub signal_orders: usize,
     /// Noise of the residual's degrees of freedom, by order from 1, as a standard deviation of weighted residuals.
     pub floor_std: Vec<f64>,
     /// Mean slope of the characteristics, `[reading]`.
@@ -88,7 +90,11 @@ impl Solved {
             })
             .collect();
         let propagation = Propagation::of(&corrected, &operators);
-        let (residual, factors) = judged_residual(&operators, &corrected, &linear, propagation.as_ref());
+        let (residual, mut factors) = judged_residual(&operators, &corrected, &linear, propagation.as_ref());
+        if data.part == Part::All {
+            let coupled = solver.coupled_noise(&corrected, &operators, &estimate).unwrap_or_default();
+            factors.iter_mut().zip(coupled).for_each(|(factor, coupled)| *factor *= coupled);
+        }
         let is_wider = corrected.has_more_than_noise() || factors.iter().any(|factor| *factor > 1.0);
         let mut stated = None;
         if data.part == Part::All && is_wider {
@@ -110,6 +116,7 @@ impl Solved {
             corrected,
             linear,
             whitened,
+            signal_orders: data.signal_orders,
             floor_std,
             slopes,
             residual,
@@ -145,6 +152,16 @@ fn axial(
 }
 
 impl Solved {
+    /// [Whitened](Self::whitened), of the orders that say something of effects.
+    pub(crate) fn traced(&self) -> &[Vec<Complex64>] {
+        &self.whitened[..self.signal_orders]
+    }
+
+    /// Degrees of freedom of an order from 1.
+    pub(crate) fn freedom(&self, order: usize) -> usize {
+        2 * self.corrected.count.saturating_sub(self.operators.orders[order - 1].rank)
+    }
+
     /// How an unknown moves with a parameter, by order from 2: its operator on the readings' partials.
     pub(crate) fn moved_by<'a>(
         &'a self,
