@@ -44,6 +44,31 @@ fn a_reading_far_from_all_others_is_reported_unless_its_turn_is_left_out() {
     assert!(!warnings.contains("µm at sample"), "{warnings}");
 }
 
+/// A recorder that is faster than its sensors repeats each reading, while the angle goes on.
+#[test]
+fn readings_that_stand_for_several_samples_refute_the_values() {
+    let head = RECORDING.lines().find(|line| line.starts_with("Zeit")).unwrap();
+    let rows = RECORDING.lines().filter(|line| line.starts_with('1')).map(|line| line.split(';').collect());
+    let cells: Vec<Vec<&str>> = rows.collect();
+    let sensors: Vec<bool> = head.split(';').map(|name| ["A", "B", "C"].contains(&name)).collect();
+    for samples in [1, 4] {
+        let row = |row: usize| -> String {
+            let held = row / samples * samples;
+            let cell = |(column, is_sensor): (usize, &bool)| cells[if *is_sensor { held } else { row }][column];
+            sensors.iter().enumerate().map(cell).collect::<Vec<_>>().join(";")
+        };
+        let held: Vec<String> = std::iter::once(head.to_owned()).chain((0..cells.len()).map(row)).collect();
+        let folder = Folder::with(&[("pipeline.toml", PIPELINE), ("shaft.csv", &held.join("\n"))]);
+        let ran = folder.run(&["run", "pipeline.toml", "--json"]);
+        assert_eq!(ran.status, 0, "{}", ran.stderr);
+        let summary: Value = serde_json::from_str(&ran.stdout).unwrap();
+        let values = summary["stations"][0]["sections"][0]["values"].as_array().unwrap();
+        let refuted =
+            values.iter().filter(|value| value["refuted_by"].to_string().contains("stands for about 4 samples"));
+        assert_eq!(refuted.count(), if samples == 4 { values.len() } else { 0 }, "{summary}");
+    }
+}
+
 #[test]
 fn a_cell_that_is_no_number_is_named_with_what_to_do() {
     let damaged = RECORDING.replacen("6,221", "NA", 1);

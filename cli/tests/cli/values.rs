@@ -163,6 +163,34 @@ fn a_limit_curve_is_decided_order_by_order() {
     }
 }
 
+/// A sharp edge has all orders, and 63 of them are solved for: what it has above is not known, and matters where no filter takes it away.
+#[test]
+fn a_limit_beside_an_edge_is_undecided_without_a_filter() {
+    let harmonic =
+        |order: u32| format!("{{ order = {order}, amplitude_um = {}, phase_deg = 90 }}", 2.0 / f64::from(order));
+    let edge: Vec<String> = (2..=120).map(harmonic).collect();
+    let edge = format!("rms_um = 0\nharmonics = [{}]", edge.join(", "));
+    let limit = |filter: &str| {
+        format!(
+            "[[limit]]\nsymbol = \"RONt\"\nreference = \"MZCI\"\nfilter = \"{filter}\"\nupper = 100\nunit = \"um\"\n"
+        )
+    };
+    for (form, unfiltered) in [("rms_um = 4\nmax_order = 20", "conforms"), (&*edge, "undecided")] {
+        let text = pipeline()
+            + "[evaluate]\nreferences = [\"MZCI\"]\nfilter_upr = [15]\n"
+            + &limit("none")
+            + &limit("Gaussian 15 UPR");
+        let scenario = SCENARIO.replace("rms_um = 4\nmax_order = 20", form);
+        let folder = Folder::with(&[("pipeline.toml", &*text), ("scenario.toml", &*scenario), ("rig.toml", RIG)]);
+        assert_eq!(folder.run(&["simulate", "scenario.toml"]).status, 0);
+        let ran = folder.run(&["run", "pipeline.toml", "--json"]);
+        assert_eq!(ran.status, 0, "{}", ran.stderr);
+        let summary: Value = serde_json::from_str(&ran.stdout).unwrap();
+        let decisions = [0, 1].map(|limit| summary["limits"][limit]["decision"].as_str().unwrap());
+        assert_eq!(decisions, [unfiltered, "conforms"], "{}", summary["limits"]);
+    }
+}
+
 #[test]
 fn warnings_end_the_program_only_when_asked() {
     let folder = campaign("");

@@ -4,11 +4,11 @@
 
 use std::{fmt::Write, fs, path::Path};
 
-use crate::support::{python, registry};
+use crate::support::{MULTI_STEP_RIG, python, registry};
 use runout_core::{
     Result,
     closed_loop::diagnosis::{Diagnosis, Verdict},
-    pipeline::{Pipeline, diagnose::diagnose, run::Silent},
+    pipeline::{Pipeline, diagnose::diagnose, document::ConfigError, run::Silent},
 };
 
 /// What one unit of `slope` adds, by the frames alone.
@@ -76,13 +76,16 @@ fn pipeline(
 ) -> std::result::Result<Pipeline, String> {
     fs::write(folder.join("own.py"), script).unwrap();
     fs::write(folder.join("plate.csv"), plate(per_kelvin)).unwrap();
-    let text = format!(
+    Pipeline::from_toml(&text(python, more), folder, &registry()).map_err(|error| error.to_string())
+}
+
+fn text(python: &str, more: &str) -> String {
+    format!(
         "load = {{ plugin = \"points\", path = \"plate.csv\" }}\nseparate = {{ plugin = \"flatness\" }}\n\
          [[effect]]\nplugin = \"external\"\nid = \"warm-air\"\ncommand = [{python:?}, \"own.py\"]\ncolumns = [\"temperature_k\"]\n\
          config = {{ reference_k = 20 }}\nparameters = [{{ name = \"slope\", unit = \"urad/K\", usual = 0.5 }}]\n{more}\n\
          [[export]]\nplugin = \"parquet\"\npath = \"out\"\n"
-    );
-    Pipeline::from_toml(&text, folder, &registry()).map_err(|error| error.to_string())
+    )
 }
 
 fn diagnosed(python: &str, script: &str, per_kelvin: f64, more: &str) -> Result<Diagnosis> {
@@ -132,4 +135,31 @@ fn what_cannot_be_is_an_error_in_words() {
     let folder = tempfile::tempdir().unwrap();
     let none = pipeline(folder.path(), &python, SCRIPT, 0.8, "labels = [\"line\", \"line\"]").err().unwrap();
     assert!(none.contains("names of columns must differ"), "{none}");
+}
+
+#[test]
+fn an_effect_of_other_data_is_refused_by_name() {
+    let text = text("python3", "");
+    let turns = format!(
+        "rig = {MULTI_STEP_RIG}\n[load]\nplugin = \"simulated\"\nseed = 9\nrig = {MULTI_STEP_RIG}\n\
+         [[preprocess]]\nplugin = \"synchronous-average\"\nsamples_per_rev = 128\n\
+         [separate]\nplugin = \"harmonic-least-squares\"\n"
+    );
+    let [points, effect] = ["load = ", "[[effect]]"].map(|from| text.find(from).unwrap());
+    let of_turns = text.replace(&text[points..effect], &turns);
+    for (text, expected, help) in [
+        (text.replace("columns = [\"temperature_k\"]\n", ""), "changes a channel of turns", "names the columns"),
+        (of_turns, "turns have no columns", "leave `columns` and `labels` out"),
+        (
+            text.replace("\"flatness\"", "\"touch-probe\""),
+            "takes no effect of a pipeline's own, as `warm-air`",
+            "leave [[effect]] out",
+        ),
+    ] {
+        let Err(ConfigError::Text(mistake)) = Pipeline::from_toml(&text, Path::new("."), &registry()) else {
+            panic!("it is taken: {expected}")
+        };
+        assert!(mistake.message.contains(expected), "{expected}: {}", mistake.message);
+        assert!(mistake.help.as_deref().unwrap_or_default().contains(help), "{help}: {:?}", mistake.help);
+    }
 }

@@ -2,6 +2,9 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests; shares are printed")]
 
+#[path = "../../../tests/support/trials.rs"]
+mod trials;
+
 use arrow_array::Float64Array;
 use runout_core::{
     Result,
@@ -12,6 +15,7 @@ use runout_core::{
     stage::{Outcome, PointDiagnosis, PointSeparator, Separator},
 };
 use runout_flatness::FlatnessConfig;
+use trials::{fewest, trials};
 
 /// Corners, middles of the edges and the centre of a plate of 800 mm x 600 mm: lines in steps of 100 mm.
 const LINES: [(&str, [f64; 2], [f64; 2]); 8] = [
@@ -140,39 +144,37 @@ fn a_plate_without_noise_has_its_heights() {
 
 #[test]
 fn intervals_hold_the_truth() {
-    let truth = truth();
+    let (truth, plates) = (truth(), trials(150));
     for (noise_urad, is_stated) in [(0.2, true), (0.2, false), (3.0, true), (3.0, false)] {
         let mut held = [0; 5];
-        for seed in 0..150 {
+        for seed in 0..plates as u64 {
             let found = run(&Rows::of(&LINES, noise_urad, 0.0, seed), is_stated.then_some(noise_urad)).unwrap();
             for ((held, value), truth) in held.iter_mut().zip(&found.values).zip(truth) {
                 let [low, high] = value.interval_95().unwrap();
-                *held += u32::from(low <= truth && truth <= high);
+                *held += usize::from(low <= truth && truth <= high);
             }
         }
-        let shares = held.map(|held| f64::from(held) / 1.5);
-        println!("noise {noise_urad} µrad, stated {is_stated}: {shares:.1?} %");
-        // 95 % of 150 are known to 1.8 %.
-        assert!(shares.iter().all(|share| *share >= 89.0), "{noise_urad} {is_stated}: {shares:?}");
+        println!("noise {noise_urad} µrad, stated {is_stated}: {held:?} of {plates}");
+        let least = fewest(plates, [134, 150], 0.95);
+        assert!(held.iter().all(|held| *held >= least), "{noise_urad} {is_stated}: {held:?} of {plates}");
     }
 }
 
 /// A plate that is fifty times as flat as the other: what is found is noise, which may have hidden as much.
 #[test]
 fn intervals_of_a_flat_plate_hold_the_truth() {
-    let mut held = [0; 5];
-    for seed in 0..150 {
+    let (mut held, plates) = ([0; 5], trials(150));
+    for seed in 0..plates as u64 {
         let [mut flat, sound] = [3.0, 0.0].map(|noise_urad| Rows::of(&LINES, noise_urad, 0.0, seed));
         flat.0.iter_mut().zip(&sound.0).for_each(|(row, sound)| row.2 -= 0.98 * sound.2);
         let found = run(&flat, Some(3.0)).unwrap();
         for ((held, value), truth) in held.iter_mut().zip(&found.values).zip(truth()) {
             let [low, high] = value.interval_95().unwrap();
-            *held += u32::from((low..=high).contains(&(0.02 * truth)));
+            *held += usize::from((low..=high).contains(&(0.02 * truth)));
         }
     }
-    let shares = held.map(|held| f64::from(held) / 1.5);
-    println!("flat: {shares:.1?} %");
-    assert!(shares.iter().all(|share| *share >= 89.0), "{shares:?}");
+    println!("flat: {held:?} of {plates}");
+    assert!(held.iter().all(|held| *held >= fewest(plates, [134, 150], 0.95)), "{held:?} of {plates}");
 }
 
 #[test]

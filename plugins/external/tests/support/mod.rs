@@ -74,6 +74,7 @@ pub(crate) fn registry() -> Registry {
     registry.loaders.add(Plugin::of::<Simulated>());
     runout_points::register(&mut registry);
     runout_flatness::register(&mut registry);
+    runout_touch_probe::register(&mut registry);
     runout_preprocess::register(&mut registry);
     runout_spindle::register(&mut registry);
     runout_parquet::register(&mut registry);
