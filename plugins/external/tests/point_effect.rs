@@ -151,7 +151,10 @@ fn an_effect_of_other_data_is_refused_by_name() {
         (text.replace("columns = [\"temperature_k\"]\n", ""), "changes a channel of turns", "names the columns"),
         (of_turns, "turns have no columns", "leave `columns` and `labels` out"),
         (
-            text.replace("\"flatness\"", "\"touch-probe\""),
+            text.replace(
+                "\"flatness\"",
+                "\"touch-probe\", ring_radius_mm = 20, setups = [{ id = \"r0\" }, { id = \"r100\", ring_deg = 100 }]",
+            ),
             "takes no effect of a pipeline's own, as `warm-air`",
             "leave [[effect]] out",
         ),

@@ -237,7 +237,12 @@ impl Fit for SpindleFit {
         let place = &self.shared.places[effect];
         let mut biases = Vec::new();
         let Some(solved) = self.stations.first() else { return biases };
+        let negligible_um = self.shared.kind(effect).negligible_um();
         for (partial, parameter) in self.partials(effect, 0).iter().zip(&place.effect.parameters) {
+            let squares = partial.iter().map(Complex64::norm_sqr).sum::<f64>() / self.layout.readings.len() as f64;
+            if (0.5 * squares).sqrt() * parameter.tolerance < negligible_um {
+                continue;
+            }
             let (mut form, mut shift, mut forms, mut shifts) = (0.0, 0.0, 0, 0);
             // The face and z, where the rig has an axial sensor.
             let (mut face, mut along, mut faces, mut alongs) = (0.0, 0.0, 0, 0);

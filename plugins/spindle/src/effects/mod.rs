@@ -103,6 +103,11 @@ pub trait SpindleEffect: Send + Sync {
         true
     }
 
+    /// In µm rms, what it has to move readings by at its usual size so that it is said where a layout does not see it.
+    fn negligible_um(&self) -> f64 {
+        0.0
+    }
+
     /// How unusual these values are: the largest, in tolerances; a factor counts by its logarithm.
     fn size(&self, values: &[f64]) -> f64 {
         in_tolerances(&self.about().parameters, values)

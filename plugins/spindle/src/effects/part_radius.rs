@@ -10,7 +10,7 @@ use crate::layout::Layout;
 const USUAL: f64 = 1.0;
 /// The change of the curvature over which readings are differenced, relative.
 const STEP: f64 = 1e-4;
-/// What would move readings by less, in µm rms, is below what sensors resolve, and is not said of any layout.
+/// Near the centre it moves readings by less than sensors resolve, in µm rms.
 const NEGLIGIBLE_UM: f64 = 1e-3;
 
 /// The radius of the part.
@@ -33,10 +33,11 @@ impl SpindleEffect for PartRadius {
     fn partials(&self, _target: usize, predicted: &Predicted) -> Vec<Vec<Complex64>> {
         let per_unit = STEP * (1.0 + predicted.alterations.curvature);
         let [here, larger] = [1.0, 1.0 + STEP].map(|curvature| predicted.beyond_linear(curvature));
-        let partial: Vec<Complex64> =
-            larger.iter().zip(&here).map(|(larger, here)| (larger - here) / per_unit).collect();
-        let squares = partial.iter().map(Complex64::norm_sqr).sum::<f64>() / predicted.layout.readings.len() as f64;
-        vec![if (0.5 * squares).sqrt() * USUAL < NEGLIGIBLE_UM { predicted.nothing() } else { partial }]
+        vec![larger.iter().zip(&here).map(|(larger, here)| (larger - here) / per_unit).collect()]
+    }
+
+    fn negligible_um(&self) -> f64 {
+        NEGLIGIBLE_UM
     }
 
     fn is_declared(&self, _layout: &Layout, second_order: bool) -> bool {
