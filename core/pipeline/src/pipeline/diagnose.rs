@@ -135,7 +135,7 @@ fn diagnose_turns(
     diagnosis.withhold_refuted();
     diagnosis.moved.clear();
     let mut writer = ResultWriter::begin(pipeline, &pipeline.diagnosed, recording.stations())?;
-    writer.with_residuals();
+    writer.station_tables.with_residuals();
     let known = known(model.effects(), &settings.known, |effect| model.changes(effect, &settings.known));
     let changes = changes(known, &diagnosis);
     writer.corrected_for(corrections(&changes));

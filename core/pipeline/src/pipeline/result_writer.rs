@@ -48,7 +48,7 @@ pub(super) struct ResultWriter {
     /// Whether an exporter or an evaluator takes tables.
     tables_wanted: bool,
     specs: Vec<TableSpec>,
-    station_tables: StationTables,
+    pub(super) station_tables: StationTables,
     /// Whether the result has form.
     of_form: bool,
     /// Sections for a surface, or for values of all of them.
@@ -126,11 +126,6 @@ impl ResultWriter {
             in_data_set: pipeline.in_data_set,
             lock,
         })
-    }
-
-    /// What a model leaves of each averaged reading is wanted too.
-    pub(super) fn with_residuals(&mut self) {
-        self.station_tables.with_residuals();
     }
 
     /// Takes a station's form and motion.
