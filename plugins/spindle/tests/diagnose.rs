@@ -4,16 +4,14 @@
 #![allow(clippy::unwrap_used, clippy::print_stdout, clippy::panic, reason = "tests")]
 
 mod channels;
+mod clamping;
 mod one_order;
 mod profiles;
 mod turns;
 mod unexplained;
 mod wiring;
 
-use crate::{
-    campaigns::{averaged, averaged_behind, campaign, two_sections},
-    trials::{fewest, trials},
-};
+use crate::campaigns::{averaged, averaged_behind, campaign};
 use runout_core::{
     Complex64,
     closed_loop::{
@@ -132,31 +130,6 @@ fn a_large_gain_is_found_with_its_partner() {
         assert!(named.contains(&"sensor-gain S2".to_owned()), "{named:?}");
         assert!(after <= 1.01 * before, "{before} → {after}");
     }
-}
-
-/// A clamping, the mark and a turn of all sensors differ by what the motion does in one setup only, and orders of noise say nothing of it: the clamping is
-/// named, alone or beside the others.
-#[test]
-fn a_clamping_is_named_beside_what_is_nearly_alike() {
-    let campaigns = trials(24);
-    let named = (0..campaigns as u64).filter(|seed| {
-        let mut config = campaign(700 + seed, r#"[{"plugin":"reversal-angle","targets":["b"],"angle_deg":0.4}]"#);
-        config.rig.sensors = two_sections(&[0.0, 99.844, 202.5]);
-        config.rig.setups.truncate(2);
-        config.rig.setups[1].part_deg = 180.0;
-        (config.form.rms_um, config.form.max_order) = (1.0, 30);
-        (config.motion.x_rms_um, config.motion.y_rms_um, config.motion.tilt_rms_urad) = (0.5, 0.5, 1.0);
-        (config.noise.rms_um, config.asynchronous.rms_um) = (0.02, Some(0.05));
-        config.recording.revolutions = 20;
-        let found = diagnosed(&config).0.diagnosis;
-        let [added] = &found.added[..] else { return false };
-        let all = std::iter::once(added.effect.as_str()).chain(added.confounded_with.iter().map(String::as_str));
-        let all: Vec<&str> = all.collect();
-        println!("simulated, seed {seed}: {all:?}");
-        all.iter().any(|one| one.starts_with("reversal-angle"))
-    });
-    let named = named.count();
-    assert!(named >= fewest(campaigns, [23, 24], 0.98), "{named} of {campaigns}");
 }
 
 /// Turns that are all alike, as a simulator without noise writes them, have the noise of their resampling only.

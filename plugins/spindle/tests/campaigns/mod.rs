@@ -96,7 +96,7 @@ fn averaged_through(
     let simulator = simulate::simulator(config).unwrap();
     let recording = simulator.spindle_recording();
     let average = SynchronousAverageConfig {
-        samples_per_rev: 512,
+        samples_per_rev: config.recording.samples_per_rev.min(512),
         min_turns: 2,
         turn_tolerance_percent: 5.0,
         outlier_sigma: None,
