@@ -1,8 +1,11 @@
 //! The interval of a value, by how far values of draws measured again miss those of the draws themselves.
 
-use crate::uncertainty::{NORMAL_95, Uncertainty};
+use crate::{
+    section::FORMS,
+    uncertainty::{NORMAL_95, Uncertainty},
+};
 
-/// Share of the draws below and above: the two forms are not exact, so that less is left out than 2.5 %.
+/// Share of the draws below and above: the forms are not exact, so that less is left out than 2.5 %.
 const TAIL: f64 = 0.02;
 
 /// Values of the draws of one form, and by how much those measured again miss them.
@@ -64,24 +67,23 @@ pub struct Interval {
 
 impl Interval {
     /// Where the data refute the noise as too large, the truth may be as large as what was found with all of that noise.
-    pub(crate) fn of(found: f64, processed: f64, mut sides: [Sides; 2], refutes_noise: bool) -> Self {
+    pub(crate) fn of(found: f64, processed: f64, mut sides: [Sides; FORMS], refutes_noise: bool) -> Self {
         let lowest = sides.iter().map(|sides| sides.lowest).fold(f64::INFINITY, f64::min);
         let draws = sides.iter().map(|sides| sides.missed.len()).sum();
-        let [of_least, of_most] = &mut sides;
-        let (Some(least), Some(most)) = (of_least.quantiles(), of_most.quantiles()) else {
-            return Self { found, uncertainty: None, share_of_noise: f64::NAN };
-        };
-        if !(found.is_finite() && processed.is_finite()) {
+        let missed: Vec<[f64; 3]> = sides.iter_mut().filter_map(Sides::quantiles).collect();
+        if missed.len() < FORMS || !(found.is_finite() && processed.is_finite()) {
             return Self { found, uncertainty: None, share_of_noise: f64::NAN };
         }
         let floor = if lowest >= 0.0 { 0.0 } else { f64::NEG_INFINITY };
-        let mut high = processed - least[0].min(most[0]);
+        let least = missed.iter().map(|of| of[0]).fold(f64::INFINITY, f64::min);
+        let most = missed.iter().map(|of| of[2]).fold(f64::NEG_INFINITY, f64::max);
+        let mut high = processed - least;
         if refutes_noise {
-            high = high.max(of_most.highest());
+            high = sides.iter_mut().map(Sides::highest).fold(high, f64::max);
         }
-        let interval_95 = [processed - least[2].max(most[2]), high].map(|end| end.max(floor));
+        let interval_95 = [processed - most, high].map(|end| end.max(floor));
         let std = (interval_95[1] - interval_95[0]) / (2.0 * NORMAL_95);
-        let share_of_noise = found - processed + 0.5 * (least[1] + most[1]);
+        let share_of_noise = found - processed + missed.iter().map(|of| of[1]).sum::<f64>() / FORMS as f64;
         Self { found, uncertainty: Some(Uncertainty::new(std, interval_95, draws)), share_of_noise }
     }
 

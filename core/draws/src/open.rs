@@ -19,7 +19,7 @@ use runout_numerics::{
 use crate::{
     interval::{Interval, Sides},
     profiles::wider,
-    section::{Measured, Section},
+    section::{FORMS, Form, Measured, Section},
     spectrum::VarianceFrom,
 };
 
@@ -86,27 +86,27 @@ impl OpenErrors {
         );
         let mut found = Vec::new();
         look(profile_um, &mut found);
-        let mut sides: Vec<[Sides; 2]> = found.iter().map(|_| [Sides::default(), Sides::default()]).collect();
+        let mut sides: Vec<[Sides; FORMS]> = found.iter().map(|_| Default::default()).collect();
         let draws = (POINTS_DRAWN / (4 * profile_um.len())).clamp(FEWEST_DRAWS, DRAWS);
         let [mut of_truth, mut of_again] = [Vec::new(), Vec::new()];
-        for (side, form) in section.forms.iter().enumerate() {
+        for (form, Form { mean, spread }) in section.forms.iter().enumerate() {
+            let mut drawn = Closed { taken_um: taken_um.clone(), harmonics: mean.clone() };
+            look(&closing.opened(&drawn), emptied(&mut of_truth));
             for _ in 0..draws {
                 let [of_form, of_measurement] = errors.next().map(|errors_um| closing.closed(&errors_um));
-                let spread = of_form.harmonics.iter().zip(&form.spread).map(|(error, spread)| spread * error);
-                let truth = Closed {
-                    taken_um: sum(&taken_um, &of_form.taken_um),
-                    harmonics: sum(&form.mean, &spread.collect::<Vec<_>>()),
-                };
-                let again = Closed {
-                    taken_um: sum(&truth.taken_um, &of_measurement.taken_um),
-                    harmonics: sum(&truth.harmonics, &of_measurement.harmonics),
-                };
-                for (closed, found) in [(truth, &mut of_truth), (again, &mut of_again)] {
-                    found.clear();
-                    look(&closing.opened(&closed), found);
+                if let Some(spread) = spread {
+                    let of_orders = of_form.harmonics.iter().zip(spread).map(|(error, spread)| spread * error);
+                    drawn.taken_um = sum(&taken_um, &of_form.taken_um);
+                    drawn.harmonics = sum(mean, &of_orders.collect::<Vec<_>>());
+                    look(&closing.opened(&drawn), emptied(&mut of_truth));
                 }
+                let again = Closed {
+                    taken_um: sum(&drawn.taken_um, &of_measurement.taken_um),
+                    harmonics: sum(&drawn.harmonics, &of_measurement.harmonics),
+                };
+                look(&closing.opened(&again), emptied(&mut of_again));
                 for (sides, (truth, again)) in sides.iter_mut().zip(of_truth.iter().zip(&of_again)) {
-                    sides[side].add(*truth, *again);
+                    sides[form].add(*truth, *again);
                 }
             }
         }
@@ -119,6 +119,11 @@ impl OpenErrors {
         let beside = self.correlation.iter().enumerate().skip(1);
         (1.0 + 2.0 * beside.map(|(lag, share)| share * (step * lag as f64).cos()).sum::<f64>()).max(LEAST_POWER)
     }
+}
+
+fn emptied(found: &mut Vec<f64>) -> &mut Vec<f64> {
+    found.clear();
+    found
 }
 
 fn sum<T: Copy + std::ops::Add<Output = T>>(one: &[T], other: &[T]) -> Vec<T> {

@@ -10,7 +10,7 @@ use runout_numerics::{Complex64, fourier::Fourier};
 use crate::{
     errors::{DrawnErrors, Errors, largest},
     interval::{Interval, Sides},
-    section::{Form, Measured, Section, known_together},
+    section::{FORMS, Measured, Section, known_together},
     spectrum::VarianceFrom,
 };
 
@@ -30,7 +30,7 @@ const NEGLIGIBLE: f64 = 1e-6;
 /// Squares below which draws of a variance take no more than of this many: its mean would not exist.
 const FEWEST_SQUARES: f64 = 24.0;
 /// Profiles about which noise is drawn: the ones found, the same processed, and of each form the true ones and those measured again.
-pub const KINDS: usize = 6;
+pub const KINDS: usize = 2 + 2 * FORMS;
 const FOUND: usize = 0;
 const PROCESSED: usize = 1;
 
@@ -46,7 +46,7 @@ pub struct Draws {
     /// Orders whose variances are known together.
     together: Vec<Range<usize>>,
     /// By form and transform, the factor on the noise of each of them.
-    wider: [Vec<Vec<f64>>; 2],
+    wider: [Vec<Vec<f64>>; FORMS],
     lowest: usize,
     transforms: usize,
 }
@@ -85,8 +85,8 @@ impl Draws {
         let together = known_together(longest.map_or(&[][..], Vec::as_slice), variance_from.together());
         let chances: Vec<Option<ChiSquared<f64>>> =
             together.iter().map(|(_, squares)| ChiSquared::new(*squares as f64).ok()).collect();
-        let wider = [0, 1].map(|form| {
-            let mut random = ChaCha8Rng::seed_from_u64(seed.wrapping_add(form));
+        let wider = std::array::from_fn(|form| {
+            let mut random = ChaCha8Rng::seed_from_u64(seed.wrapping_add(form as u64));
             let mut of_all = || {
                 let groups = together.iter().zip(&chances);
                 groups.map(|((_, squares), of)| wider(*squares, of.as_ref(), variance_from, &mut random)).collect()
@@ -127,14 +127,12 @@ impl Draws {
             });
             each.collect()
         };
-        let undisturbed_um = [
-            of_kind(&|section| section.found.clone()),
-            of_kind(&|section| section.processed(&section.found)),
-            of_kind(&|section| section.forms[0].mean.clone()),
-            of_kind(&|section| section.processed(&section.forms[0].mean)),
-            of_kind(&|section| section.forms[1].mean.clone()),
-            of_kind(&|section| section.processed(&section.forms[1].mean)),
-        ];
+        let undisturbed_um = std::array::from_fn(|kind| match kind {
+            FOUND => of_kind(&|section| section.found.clone()),
+            PROCESSED => of_kind(&|section| section.processed(&section.found)),
+            kind if kind % 2 == 0 => of_kind(&|section| section.forms[kind / 2 - 1].mean.clone()),
+            kind => of_kind(&|section| section.processed(&section.forms[kind / 2 - 1].mean)),
+        });
         Profiles { draws: self, weights, angles, undisturbed_um }
     }
 
@@ -223,15 +221,21 @@ impl Profiles<'_> {
     pub fn values(&self, mut look: impl FnMut(usize, Option<&[DrawnErrors]>, &mut Vec<f64>)) -> Vec<Interval> {
         let mut undisturbed: Vec<Vec<f64>> = vec![Vec::new(); KINDS];
         undisturbed.iter_mut().enumerate().for_each(|(kind, found)| look(kind, None, found));
-        let (processed, found) = (undisturbed.swap_remove(PROCESSED), undisturbed.swap_remove(FOUND));
-        let mut sides: Vec<[Sides; 2]> = found.iter().map(|_| [Sides::default(), Sides::default()]).collect();
-        let [mut of_truth, mut of_again] = [Vec::new(), Vec::new()];
-        for form in 0..2 {
-            self.draw(form, |[truth, again]| {
-                for (kind, noise, found) in [(0, truth, &mut of_truth), (1, again, &mut of_again)] {
-                    found.clear();
-                    look(2 + 2 * form + kind, Some(noise), found);
+        let [found, processed] = [FOUND, PROCESSED].map(|kind| std::mem::take(&mut undisturbed[kind]));
+        let mut sides: Vec<[Sides; FORMS]> = found.iter().map(|_| Default::default()).collect();
+        let mut values = |kind: usize, noise: &[DrawnErrors], found: &mut Vec<f64>| {
+            found.clear();
+            look(kind, Some(noise), found);
+        };
+        let mut of_again = Vec::new();
+        for form in 0..FORMS {
+            let kind = 2 + 2 * form;
+            let mut of_truth = std::mem::take(&mut undisturbed[kind]);
+            self.draw(form, |truth, again| {
+                if let Some(truth) = truth {
+                    values(kind, truth, &mut of_truth);
                 }
+                values(kind + 1, again, &mut of_again);
                 for (sides, (truth, again)) in sides.iter_mut().zip(of_truth.iter().zip(&of_again)) {
                     sides[form].add(*truth, *again);
                 }
@@ -257,8 +261,8 @@ impl Profiles<'_> {
         })
     }
 
-    /// Noise of all sections, of true profiles and of those measured again, draw by draw.
-    fn draw(&self, form: usize, mut next: impl FnMut([&[DrawnErrors]; 2])) {
+    /// Noise of all sections, of true profiles where the form is drawn and of those measured again, draw by draw.
+    fn draw(&self, form: usize, mut next: impl FnMut(Option<&[DrawnErrors]>, &[DrawnErrors])) {
         let Self { draws, angles, .. } = *self;
         let sections = &draws.sections;
         let mut fourier = Fourier::new(angles);
@@ -273,7 +277,7 @@ impl Profiles<'_> {
         for transform in 0..draws.transforms {
             let wider = draws.wider(form, transform);
             for ((section, errors), drawn) in sections.iter().zip(&mut sources).zip(&mut drawn) {
-                self.noise(section, &section.forms[form], errors, &wider, &mut fourier, drawn);
+                self.noise(section, section.forms[form].spread.as_deref(), errors, &wider, &mut fourier, drawn);
             }
             for turn in 0..TURNS {
                 // By the golden section, so that neither places nor phases of low orders come again.
@@ -299,12 +303,14 @@ impl Profiles<'_> {
                         sum.iter_mut().zip(mark_um).for_each(|(noise, mark)| *noise += height * mark);
                     }
                 }
-                let truth: Vec<DrawnErrors> = drawn.iter().map(|drawn| drawn.turned(TRUTH, from)).collect();
+                let is_drawn = sections.iter().any(|section| section.forms[form].spread.is_some());
+                let truth: Option<Vec<DrawnErrors>> =
+                    is_drawn.then(|| drawn.iter().map(|drawn| drawn.turned(TRUTH, from)).collect());
                 let again = drawn.iter().zip(&with_marks);
                 let again: Vec<DrawnErrors> = again
                     .map(|(drawn, sum)| if sum.is_empty() { drawn.turned(AGAIN, from) } else { DrawnErrors::new(sum) })
                     .collect();
-                next([&truth, &again]);
+                next(truth.as_deref(), &again);
             }
         }
     }
@@ -319,34 +325,37 @@ impl Profiles<'_> {
         each.collect()
     }
 
-    /// One draw of the noise of a section.
+    /// One draw of the noise of a section: of the true profile the share `spread` of each order, where it is drawn.
     fn noise(
         &self,
         section: &Section,
-        form: &Form,
+        spread: Option<&[f64]>,
         [of_form, of_measurement]: &mut [Errors; 2],
         wider: &[f64],
         fourier: &mut Fourier,
         drawn: &mut Drawn,
     ) {
         let Drawn { truth, again, over_angles: [of_truth, of_again] } = drawn;
-        of_form.harmonics(truth);
         of_measurement.harmonics(again);
         // Above, marks alone see noise.
         let seen = if section.marks.all.is_empty() { self.weights.len() } else { section.kept.len() };
-        truth.truncate(seen);
         again.truncate(seen);
-        let both = truth.iter_mut().zip(again.iter_mut()).zip(form.spread.iter().zip(wider));
-        for ((truth, again), (spread, wider)) in both {
-            *truth *= spread * wider;
-            *again = *truth + *again * *wider;
+        again.iter_mut().zip(wider).for_each(|(again, wider)| *again *= wider);
+        if let Some(spread) = spread {
+            of_form.harmonics(truth);
+            truth.truncate(seen);
+            for ((truth, again), (spread, wider)) in
+                truth.iter_mut().zip(again.iter_mut()).zip(spread.iter().zip(wider))
+            {
+                *truth *= spread * wider;
+                *again += *truth;
+            }
+            let weighted = truth.iter().zip(&self.weights).map(|(noise, weight)| noise * weight);
+            fourier.synthesise_into(weighted, &mut of_truth.0);
+            of_truth.1 = largest(&of_truth.0);
         }
-        let weighted = truth.iter().zip(&self.weights).map(|(noise, weight)| noise * weight);
-        fourier.synthesise_into(weighted, &mut of_truth.0);
         let kept = again.iter().zip(&section.kept).zip(&self.weights);
         fourier.synthesise_into(kept.map(|((noise, kept), weight)| noise * weight * *kept), &mut of_again.0);
-        for (noise_um, largest_um) in [of_truth, of_again] {
-            *largest_um = largest(noise_um);
-        }
+        of_again.1 = largest(&of_again.0);
     }
 }

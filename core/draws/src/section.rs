@@ -1,10 +1,14 @@
 //! What the true profile of one section may be: the least and the most form that its harmonics allow.
+//!
+//! The least is one profile, what certainly stands out; the same with its crests and valleys as flat as they may be is another, of which noise raises values
+//! most. The most is drawn: what may be there.
 
 use std::ops::Range;
 
 use runout_numerics::Complex64;
 
 use crate::{
+    flat::cut,
     marks::{Marks, NARROW, WIDTHS_DEG},
     spectrum::{Noise, Power, Spectrum, VarianceFrom},
 };
@@ -40,11 +44,14 @@ pub struct Measured {
     pub lowest: usize,
 }
 
-/// A profile that the true one may be: its mean, and the share of each order's error by which it is uncertain.
+/// What the true profile may be.
+pub(crate) const FORMS: usize = 3;
+
+/// A profile that the true one may be: its mean, and the share of each order's error by which it is drawn, where it is.
 #[derive(Debug, Clone)]
 pub(crate) struct Form {
     pub mean: Vec<Complex64>,
-    pub spread: Vec<f64>,
+    pub spread: Option<Vec<f64>>,
 }
 
 /// A section read twice.
@@ -55,8 +62,8 @@ pub(crate) struct Section {
     pub(crate) marks: Marks,
     /// Share of each order that the processing keeps beside marks.
     pub(crate) kept: Vec<f64>,
-    /// The least form, and the most.
-    pub(crate) forms: [Form; 2],
+    /// The least, the same as flat as it may be, and the most.
+    pub(crate) forms: [Form; FORMS],
     /// Whether the data have less power than their noise would have.
     pub(crate) refutes_noise: bool,
 }
@@ -85,22 +92,22 @@ impl Section {
         let least = spectrum.shares(Power::Least { seen }, SHOWN_LEAST);
         let most = whole_where_large(Spectrum::of(&rest_of_most, noise).shares(Power::Most, SHOWN_MOST));
         let kept = whole_where_large(spectrum.shares(Power::Most, SHOWN));
-        let form = |rest: &[Complex64], share: Vec<f64>| {
+        let mean = |rest: &[Complex64], share: &[f64]| -> Vec<Complex64> {
             let beside = |order: usize| harmonics[order] - rest[order];
-            let mean = (0..rest.len()).map(|order| beside(order) + share[order] * rest[order]).collect();
-            Form { mean, spread: share.into_iter().map(f64::sqrt).collect() }
+            (0..rest.len()).map(|order| beside(order) + share[order] * rest[order]).collect()
         };
-        let forms = [form(&rest, least), form(&rest_of_most, most)];
+        let least = mean(&rest, &least);
+        let flat = Form { mean: cut(&least, noise), spread: None };
+        let spread = Some(most.iter().map(|share| share.sqrt()).collect());
+        let most = Form { mean: mean(&rest_of_most, &most), spread };
+        let forms = [Form { mean: least, spread: None }, flat, most];
         Self { found: harmonics.clone(), marks, kept, forms, refutes_noise: false }
     }
 
     /// What was found may be anything from noise alone to all form, and nothing is taken out of it.
     fn of_any_noise(found: &[Complex64]) -> Self {
-        let none = vec![0.0; found.len()];
-        let forms = [
-            Form { mean: vec![Complex64::ZERO; found.len()], spread: none.clone() },
-            Form { mean: found.to_vec(), spread: none },
-        ];
+        let nothing = Form { mean: vec![Complex64::ZERO; found.len()], spread: None };
+        let forms = [nothing.clone(), nothing, Form { mean: found.to_vec(), spread: Some(vec![0.0; found.len()]) }];
         let (marks, kept) = (Marks::default(), vec![1.0; found.len()]);
         Self { found: found.to_vec(), marks, kept, forms, refutes_noise: true }
     }

@@ -233,11 +233,12 @@ impl<'a> Spectrum<'a> {
 
     /// Power of the waves at an order.
     pub(crate) fn waves(&self, order: usize, power: Power) -> f64 {
-        let (total, of_noise) = (self.total[order], self.of_noise[order]);
-        let (quantile, is_seen) = match power {
-            Power::Least { seen } => (LIMIT, total > of_noise * of_mean_square(self.without_waves[order], seen)),
-            Power::Middle => (0.0, true),
-            Power::Most => (-LIMIT, true),
+        let (found, of_noise) = (self.total[order], self.of_noise[order]);
+        let (total, quantile, is_seen) = match power {
+            Power::Least { seen } => (found, LIMIT, found > of_noise * of_mean_square(self.without_waves[order], seen)),
+            Power::Middle => (found, 0.0, true),
+            // Noise that is less than usual by chance has hidden as much as usual.
+            Power::Most => (found.max(of_noise), -LIMIT, true),
         };
         let level = if power == Power::Middle { 1.0 } else { of_mean_square(self.with_waves[order], quantile) };
         if is_seen { (total / level - of_noise).max(0.0) } else { 0.0 }

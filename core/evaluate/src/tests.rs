@@ -358,8 +358,11 @@ fn intervals_of_cylindricity_hold_the_truth() {
         for (name, inside, ratio) in cylindricity_intervals("references = ['LSCI']\nfilter_upr = []", noise_um, 60) {
             // 95 % of 60 are 57 ± 1.7. Below 0.1 µm; above, noise is as large as the form, and only the size of ± is looked at.
             assert!(noise_um > 0.1 || inside >= 0.85, "{name}, {noise_um} µm: {inside}");
-            // A standard deviation of 60 is known to 9 %.
-            assert!((0.7..2.6).contains(&ratio), "{name}, {noise_um} µm: stated {ratio} times the scatter");
+            // A standard deviation of 60 is known to 9 %. Above, the least form is next to nothing, and ± reaches that far.
+            assert!(
+                (0.7..if noise_um > 0.1 { 3.0 } else { 2.6 }).contains(&ratio),
+                "{name}, {noise_um} µm: stated {ratio} times the scatter"
+            );
         }
     }
 }
