@@ -20,6 +20,7 @@ use runout_core::{
     numerics::fourier::Fourier,
     pipeline::{Context, StageConfig},
     points::{PointColumn, PointKind::Number, Points},
+    profile::{orders_beside, smooth_by_order},
     stage::{Outcome, PointSeparator, Separator},
     standards::roundness::{self, Angles, Reference},
     summary::Value,
@@ -157,7 +158,7 @@ impl Circular {
             fourier.analyse(mean.iter().copied(), &mut harmonics);
             let variance: Vec<f64> = noise.variance.iter().map(|variance| variance / turns.len() as f64).collect();
             sources.push(vec![(seed_of(*sign), variance.iter().map(|variance| variance.sqrt().into()).collect())]);
-            let (squares, variance_from) = (vec![noise.squares; variance.len()], VarianceFrom::OrdersBeside);
+            let (squares, variance_from) = (noise.squares.clone(), VarianceFrom::OrdersBeside);
             measured.push(Measured { harmonics, variance, squares, variance_from, lowest: 0 });
         }
         let Some(draws) = Draws::of(&measured, sources, seed_of(1)) else { return Vec::new() };
@@ -267,15 +268,13 @@ fn low_orders(paths: &Paths) -> Vec<Check> {
 
 /// Single readings that are not like those of the other turns at their angle.
 fn unlike(paths: &Paths) -> Option<Check> {
-    // Between two readings there is a line, in which both of them are seen again.
-    let angles: Vec<usize> = (0..paths.angles).step_by(paths.angles_a_reading).collect();
     let at_angles = |turns: &Vec<Vec<f64>>| -> Vec<Vec<f64>> {
-        angles.iter().map(|angle| turns.iter().map(|turn| turn[*angle]).collect()).collect()
+        (0..paths.angles).map(|angle| turns.iter().map(|turn| turn[angle]).collect()).collect()
     };
     let places: Vec<Vec<f64>> = paths.turns.iter().flat_map(at_angles).collect();
     let named = |place: usize, number: usize| {
-        let path = if paths.signs[place / angles.len()] > 0 { '+' } else { '-' };
-        let angle_deg = 360.0 * angles[place % angles.len()] as f64 / paths.angles as f64;
+        let path = if paths.signs[place / paths.angles] > 0 { '+' } else { '-' };
+        let angle_deg = 360.0 * (place % paths.angles) as f64 / paths.angles as f64;
         format!("turn {number} of the {path} path at {angle_deg}°")
     };
     single(&places, named, "µm")
@@ -295,24 +294,25 @@ struct Noise {
     /// Variance of one turn's coefficient, real and imaginary part together, from order 0; the same in both directions.
     variance: Vec<f64>,
     /// Squares behind each.
-    squares: usize,
+    squares: Vec<usize>,
 }
 
 impl Noise {
     fn of(turns: &[Vec<Vec<f64>>], angles: usize) -> Self {
         let mut fourier = Fourier::new(angles);
-        let mut variance = vec![0.0; fourier.max_order() + 1];
-        let mut harmonics = vec![Complex64::ZERO; variance.len()];
+        let mut sums = vec![Complex64::ZERO; fourier.max_order() + 1];
+        let mut harmonics = sums.clone();
         let freedom: usize = turns.iter().map(|turns| turns.len() - 1).sum();
         for turns in turns {
             let mean = mean_of(turns);
             for turn in turns {
                 fourier.analyse(turn.iter().zip(&mean).map(|(turn, mean)| turn - mean), &mut harmonics);
-                variance.iter_mut().zip(&harmonics).for_each(|(sum, harmonic)| *sum += harmonic.norm_sqr());
+                sums.iter_mut().zip(&harmonics).for_each(|(sum, harmonic)| *sum += harmonic.norm_sqr());
             }
         }
-        variance.iter_mut().for_each(|sum| *sum /= freedom.max(1) as f64);
-        Self { variance, squares: 2 * freedom }
+        smooth_by_order(&mut sums, 1);
+        let squares = (0..sums.len()).map(|order| 2 * freedom * (2 * orders_beside(order) + 1)).collect();
+        Self { variance: sums.into_iter().map(|sum| sum.re / freedom.max(1) as f64).collect(), squares }
     }
 
     /// Whether nothing changes: no two recorded turns are alike.

@@ -2,8 +2,9 @@
 
 use runout_core::{Error, ErrorKind, Result, points::Points};
 
-/// Equal angles of a path at least, and at most: as many as its turns have readings, so that no peak between two of them is passed over.
-const ANGLES: [usize; 2] = [720, 7200];
+/// Equal angles of a path at most, and at least: as many as its turns have readings. More would repeat the noise of one reading at all angles beside it.
+const MOST_ANGLES: usize = 7200;
+const FEWEST_ANGLES: usize = 8;
 /// Net angle from which on the side that a path runs to is known, in degrees: below, readings may go to and fro.
 const RUNS_DEG: f64 = 5.0;
 /// Readings of a part of a turn that is worth a remark.
@@ -21,8 +22,6 @@ pub(crate) fn refused(points: &Points, problem: String) -> Error {
 pub(crate) struct Paths {
     /// Equal angles of each path.
     pub angles: usize,
-    /// Angles a reading: more than 1 where there are fewer readings than angles.
-    pub angles_a_reading: usize,
     /// +1 counter-clockwise, −1 clockwise.
     pub signs: Vec<i8>,
     /// `[direction][turn][angle]`.
@@ -78,7 +77,7 @@ impl Paths {
             }
         }
         let most = recorded.iter().map(|(_, turn)| turn.len()).max().unwrap_or(0);
-        let angles = (2 * most.div_ceil(2)).clamp(ANGLES[0], ANGLES[1]);
+        let angles = (2 * most.div_ceil(2)).clamp(FEWEST_ANGLES, MOST_ANGLES);
         let (mut signs, mut turns): (Vec<i8>, Vec<Vec<Vec<f64>>>) = (Vec::new(), Vec::new());
         let mut left_out = 0;
         for (sign, turn) in recorded {
@@ -102,7 +101,7 @@ impl Paths {
         if left_out > 0 {
             remarks.push(format!("{left_out} turns that are not whole are left out"));
         }
-        Ok(Self { angles, angles_a_reading: (angles / most.max(1)).max(1), signs, turns, remarks })
+        Ok(Self { angles, signs, turns, remarks })
     }
 }
 

@@ -5,6 +5,7 @@ mod closed_forms;
 mod coverage;
 mod diagonals;
 mod drift;
+mod play;
 mod probing;
 mod rotary_path;
 mod structural;
