@@ -92,6 +92,61 @@ fn rows_of_text_begin_and_end_with_voids() {
     assert_eq!((void.columns, void.rows()), (4, 3), "a row of voids is none");
 }
 
+/// Columns are those that the header names, marks for missing heights are no heights, and what contradicts a matrix is refused.
+#[test]
+fn a_header_of_text_counts() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("map.txt");
+    let read = |lines: &[String], step_mm: Option<f64>| {
+        fs::write(&path, lines.join("\n")).unwrap();
+        read(&path, &Wanted { unit: Some("nm".into()), step_mm: [step_mm; 2], ..Wanted::default() })
+    };
+    let height = |x: usize, y: usize| (10 + 7 * x + 3 * y * y + x * x * (y + 1)) as f64;
+    let each = |line: &dyn Fn(usize, usize) -> String| -> Vec<String> {
+        (0..9).flat_map(|y| (0..12).map(move |x| (x, y))).map(|(x, y)| line(x, y)).collect()
+    };
+    let expected: Vec<f64> = (0..9).flat_map(|y| (0..12).map(move |x| height(x, y))).collect();
+    let named = |header: &str, line: &dyn Fn(usize, usize) -> String| [vec![header.to_owned()], each(line)].concat();
+    for lines in [
+        named("y [mm],x [mm],z [nm]", &|x, y| format!("{},{},{}", 0.2 * y as f64, 0.1 * x as f64, height(x, y))),
+        named("id x [mm] y [mm] z [nm] intensity", &|x, y| {
+            format!("7 {} {} {} 3", 0.1 * x as f64, 0.2 * y as f64, height(x, y))
+        }),
+        named("# X(mm) Y(mm) Height(nm)", &|x, y| format!("{} {} {}", 0.1 * x as f64, 0.2 * y as f64, height(x, y))),
+    ] {
+        let grid = read(&lines, None).unwrap().grid;
+        assert_eq!((grid.columns, grid.rows(), grid.height_nm.clone()), (12, 9, expected.clone()), "{}", lines[0]);
+        assert!((grid.step_x_mm - 0.1).abs() < 1e-12 && (grid.step_y_mm - 0.2).abs() < 1e-12);
+    }
+
+    let row = |y: usize, mark: &str| {
+        (0..12)
+            .map(|x| if (x, y) == (3, 2) { mark.to_owned() } else { height(x, y).to_string() })
+            .collect::<Vec<_>>()
+            .join(" ")
+    };
+    let matrix = |mark: &str| (0..9).map(|y| row(y, mark)).collect::<Vec<String>>();
+    for (header, mark) in [("NODATA_value -9999", "-9999"), ("# Value units: nm", "1.70141e38")] {
+        let grid = read(&[vec![header.to_owned()], matrix(mark)].concat(), Some(0.1)).unwrap().grid;
+        assert_eq!((grid.rows(), grid.holes()), (9, 1), "{header}");
+    }
+
+    let labels = (0..12).map(|x| format!(" {}", 0.1 * f64::from(x))).collect::<Vec<String>>().concat();
+    let labelled = (0..9).map(|y| format!("{} {}", 0.2 * y as f64, row(y, "5"))).collect::<Vec<_>>();
+    let refused = [
+        ([vec![format!("0{labels}")], labelled].concat(), "they are places, no heights"),
+        ([matrix("5"), vec![String::new()], matrix("5")].concat(), "blank lines part its rows into 2 tables"),
+        ([vec!["# Width: 2.4 mm".to_owned()], matrix("5")].concat(), "points 0.2"),
+    ];
+    for (lines, problem) in refused {
+        let error = read(&lines, Some(0.1)).unwrap_err().to_string();
+        assert!(error.contains(problem), "{error}");
+    }
+    let listed = each(&|x, y| format!("{x} {y} {} 3", height(x, y)));
+    let error = format!("{:?}", read(&listed, None).unwrap_err());
+    assert!(error.contains("does not say what its 4 columns are"), "{error}");
+}
+
 #[test]
 fn files_say_what_they_leave_out() {
     let of = |name: &str| read(&data().join(name), &Wanted::default());
