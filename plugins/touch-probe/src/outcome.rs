@@ -5,6 +5,7 @@ use std::{collections::HashSet, f64::consts::TAU};
 use runout_core::{
     Complex64, Result,
     closed_loop::diagnosis::LostOrders,
+    draws::Uncertainty,
     separation::{Quantity, Residual, SectionAt, Separation, VarianceFrom},
     stage::{Evaluable, Form, Outcome, far_below_noise},
     summary::Value,
@@ -166,7 +167,12 @@ impl TouchSolution<'_> {
             let order = lobe.order;
             let about = format!("amplitude of lobing of order {order}");
             let symbol = format!("lobe_{order}_amplitude");
-            values.push(Value::new(&symbol, of(lobe.amplitude_um()), of(along), "um", &about).not_negative());
+            let amplitude_um = lobe.amplitude_um();
+            let known = Uncertainty::of_amplitude(amplitude_um, along, self.freedom());
+            values.push(Value {
+                uncertainty: lobe.observable.then_some(known),
+                ..Value::new(&symbol, of(amplitude_um), f64::NAN, "um", &about)
+            });
             let about = format!(
                 "phase of lobing of order {order}: A cos({order} direction + phase), probe's frame; null without \
                                  evidence of the order"
@@ -248,11 +254,7 @@ impl TouchSolution<'_> {
             unknowns: vec![Quantity::Form(0)],
             estimate,
             variance,
-            freedom: match self.weights.noise {
-                Noise::Stated => 0,
-                Noise::Repeats(dof) => dof,
-                Noise::Residual => self.fit.solved.dof,
-            },
+            freedom: self.freedom(),
             variance_from: VarianceFrom::Readings,
             observable,
             residual: Residual {
@@ -265,6 +267,15 @@ impl TouchSolution<'_> {
             ..Separation::default()
         };
         Some(Form { sections: vec![separation], radius_mm: self.config.ring_radius_mm })
+    }
+
+    /// Degrees of freedom behind the variances; 0 where the noise is stated.
+    fn freedom(&self) -> usize {
+        match self.weights.noise {
+            Noise::Stated => 0,
+            Noise::Repeats(dof) => dof,
+            Noise::Residual => self.fit.solved.dof,
+        }
     }
 
     /// What the result is made of.
