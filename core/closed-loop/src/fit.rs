@@ -8,7 +8,7 @@ use runout_numerics::least_squares::Basis;
 const MAX_STEPS: usize = 12;
 /// Halvings of a step that made it worse.
 const MAX_HALVINGS: usize = 6;
-/// A refit ends when a step changes χ² by less than this share of a degree of freedom's.
+/// A refit ends when a step changes χ² by less than this share of a degree of freedom's, or promises less.
 const SETTLED: f64 = 1e-3;
 /// A column that adds less than this, relative, to those before it is no other effect.
 pub(super) const INDEPENDENT: f64 = 1e-9;
@@ -45,12 +45,16 @@ pub fn refit<M: Model>(model: &M, start: Vec<Setting>, fixed: usize) -> Result<R
     let mut settings = start;
     let mut fit = model.fit(&settings)?;
     let mut chi2 = fit.remainder().chi2();
+    let mut system = linearised(&fit, &settings[fixed..]);
     let mut ends_at_bound = false;
     for _ in 0..MAX_STEPS {
-        let step = first_step(&fit, &settings[fixed..]);
+        ends_at_bound = false;
+        if system.explained(&fit.remainder().residual) < settled(fit.remainder()) {
+            break;
+        }
+        let step = system.coefficients(&fit.remainder().residual);
         let mut share = 1.0;
         let mut better = None;
-        ends_at_bound = false;
         for _ in 0..MAX_HALVINGS {
             let mut trial = settings.clone();
             let values = trial[fixed..].iter_mut().flat_map(|setting| &mut setting.values);
@@ -69,13 +73,12 @@ pub fn refit<M: Model>(model: &M, start: Vec<Setting>, fixed: usize) -> Result<R
         }
         let Some((trial, found, found_chi2)) = better else { break };
         let gained = chi2 - found_chi2;
-        let unit = found.remainder().chi2_per_dof().min(1.0);
         (settings, fit, chi2) = (trial, found, found_chi2);
-        if gained < SETTLED * unit {
+        system = linearised(&fit, &settings[fixed..]);
+        if gained < settled(fit.remainder()) {
             break;
         }
     }
-    let system = system(&fit, &settings[fixed..]);
     let mut covariance = system.covariance();
     widen_by_open_parameters(&mut covariance, &system, &settings[fixed..]);
     for open in fit.open_within_bounds() {
@@ -86,11 +89,16 @@ pub fn refit<M: Model>(model: &M, start: Vec<Setting>, fixed: usize) -> Result<R
 
 /// What is to be taken off the parameters of free effects, to first order, `[parameter]`.
 pub(super) fn first_step(fit: &impl Fit, free: &[Setting]) -> Vec<f64> {
-    system(fit, free).coefficients(&fit.remainder().residual)
+    linearised(fit, free).coefficients(&fit.remainder().residual)
+}
+
+/// Change of χ² that is none.
+fn settled(remainder: &Remainder) -> f64 {
+    SETTLED * remainder.chi2_per_dof()
 }
 
 /// The linearised system J δ ≈ −r.
-fn system(fit: &impl Fit, free: &[Setting]) -> Basis {
+fn linearised(fit: &impl Fit, free: &[Setting]) -> Basis {
     Basis::of(free.iter().flat_map(|setting| fit.signature(setting.effect)).collect())
 }
 

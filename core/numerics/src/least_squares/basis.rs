@@ -243,6 +243,12 @@ impl Basis {
         (0..places).map(|place| self.orthonormal.iter().map(|column| column[place] * column[place]).sum()).collect()
     }
 
+    /// By how much the squares of `values` are less without what the columns can make.
+    #[must_use]
+    pub fn explained(&self, values: &[f64]) -> f64 {
+        self.orthonormal.iter().map(|column| dot(column, values).powi(2)).sum()
+    }
+
     /// Takes out of `values` what the columns can make.
     pub fn remove_from(&self, values: &mut [f64]) {
         for column in &self.orthonormal {
