@@ -276,9 +276,15 @@ fn outside_where_stated_too_large(form: usize, std_um: f64, times: f64) -> Vec<(
 /// A variance that the data refute as too large does not make an interval too narrow.
 #[test]
 fn intervals_hold_the_truth_where_noise_is_stated_too_large() {
-    for (form, std_um, times) in
-        [(0, 0.1, 100.0), (2, 0.01, 30.0), (2, 0.003, 1000.0), (3, 0.1, 10.0), (14, 0.1, 10.0), (16, 0.05, 30.0)]
-    {
+    for (form, std_um, times) in [
+        (0, 0.1, 30.0),
+        (0, 0.1, 100.0),
+        (2, 0.01, 30.0),
+        (2, 0.003, 1000.0),
+        (3, 0.1, 10.0),
+        (14, 0.1, 10.0),
+        (16, 0.05, 30.0),
+    ] {
         for (value, outside) in outside_where_stated_too_large(form, std_um, times) {
             assert!(outside <= 7, "form {form}, {std_um} µm stated {times} times too large, {value}: {outside} of 40");
         }
@@ -306,14 +312,6 @@ fn noise_that_is_small_by_chance_leaves_no_interval_of_width_0() {
             let [low, high] = known.uncertainty.unwrap().interval_95;
             assert!(low < 1e-9 && high > 0.01, "{trial}: {low} to {high}");
         }
-    }
-}
-
-#[test]
-#[ignore = "does not hold: a form above its overstated noise does not refute it, though its slopes lie in that noise"]
-fn intervals_hold_the_truth_of_a_form_above_its_overstated_noise() {
-    for (value, outside) in outside_where_stated_too_large(0, 0.1, 30.0) {
-        assert!(outside <= 7, "{value}: {outside} of 40");
     }
 }
 

@@ -58,7 +58,7 @@ impl Header {
             }
         }
         if let Some((_, value)) = line.split_once(char::is_whitespace).filter(|(name, _)| is_no_data(name)) {
-            self.not_measured = value.trim().parse().ok();
+            self.not_measured = value.trim_start_matches([' ', ':', '=']).trim().parse().ok();
         }
         let columns = named_columns(line);
         if axes(&columns).is_some() {
@@ -172,6 +172,10 @@ pub(crate) fn read(input: &Input, wanted: &Wanted) -> Result<Map> {
             .for_each(|number| *number = f64::NAN);
     }
     let named = axes(&header.columns).filter(|_| header.columns.len() == width);
+    if named.is_none() {
+        // Words of a sentence, or names of other columns than there are.
+        header.columns.clear();
+    }
     let has_size = wanted.step_mm.iter().any(Option::is_some) || header.size_mm.iter().any(Option::is_some);
     let grid = match named {
         Some(places) => points(&header, &numbers, [width, places[0], places[1], places[2]], wanted, shown),

@@ -126,7 +126,9 @@ fn a_header_of_text_counts() {
             .join(" ")
     };
     let matrix = |mark: &str| (0..9).map(|y| row(y, mark)).collect::<Vec<String>>();
-    for (header, mark) in [("NODATA_value -9999", "-9999"), ("# Value units: nm", "1.70141e38")] {
+    for (header, mark) in
+        [("NODATA_value -9999", "-9999"), ("# nodata = -1", "-1"), ("# Value units: nm", "1.70141e38")]
+    {
         let grid = read(&[vec![header.to_owned()], matrix(mark)].concat(), Some(0.1)).unwrap().grid;
         assert_eq!((grid.rows(), grid.holes()), (9, 1), "{header}");
     }
