@@ -2,7 +2,11 @@
 
 use std::{cell::RefCell, sync::Arc};
 
-use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
+pub use realfft::{ComplexToReal, RealToComplex};
+pub use rustfft::Fft;
+
+use realfft::RealFftPlanner;
+use rustfft::FftPlanner;
 
 use crate::Complex64;
 
@@ -10,9 +14,35 @@ use crate::Complex64;
 const MOST_SPARE: usize = 8;
 
 thread_local! {
-    /// Keeps the plans that it has made: captures of one recording mostly ask for the same.
-    static PLANNER: RefCell<RealFftPlanner<f64>> = RefCell::new(RealFftPlanner::new());
+    static REAL: RefCell<RealFftPlanner<f64>> = RefCell::new(RealFftPlanner::new());
+    static COMPLEX: RefCell<FftPlanner<f64>> = RefCell::new(FftPlanner::new());
     static SPARE: RefCell<Vec<Buffers>> = const { RefCell::new(Vec::new()) };
+}
+
+// Plans are made here alone: their generic code is a third of what a crate compiles that makes one. A thread keeps those that it has made.
+
+/// From real values to harmonics.
+#[must_use]
+pub fn real_forward(length: usize) -> Arc<dyn RealToComplex<f64>> {
+    REAL.with_borrow_mut(|planner| planner.plan_fft_forward(length))
+}
+
+/// From harmonics to real values.
+#[must_use]
+pub fn real_inverse(length: usize) -> Arc<dyn ComplexToReal<f64>> {
+    REAL.with_borrow_mut(|planner| planner.plan_fft_inverse(length))
+}
+
+/// Of complex values.
+#[must_use]
+pub fn complex_forward(length: usize) -> Arc<dyn Fft<f64>> {
+    COMPLEX.with_borrow_mut(|planner| planner.plan_fft_forward(length))
+}
+
+/// Of complex values, back.
+#[must_use]
+pub fn complex_inverse(length: usize) -> Arc<dyn Fft<f64>> {
+    COMPLEX.with_borrow_mut(|planner| planner.plan_fft_inverse(length))
 }
 
 /// Memory of a transform: asking the system for it each time costs as much as a transform.
@@ -70,8 +100,7 @@ impl Fourier {
     /// Plans transforms of `length` samples, at least 2.
     #[must_use]
     pub fn new(length: usize) -> Self {
-        let (forward, inverse) =
-            PLANNER.with_borrow_mut(|planner| (planner.plan_fft_forward(length), planner.plan_fft_inverse(length)));
+        let (forward, inverse) = (real_forward(length), real_inverse(length));
         let Buffers { signal, spectrum, scratch } = Buffers::of(&*forward, &*inverse);
         Self { forward, inverse, signal, spectrum, scratch }
     }

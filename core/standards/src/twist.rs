@@ -8,12 +8,10 @@
 
 use std::f64::consts::TAU;
 
-use rustfft::FftPlanner;
-
 use super::areal::HeightMap;
 use runout_numerics::{
     Complex64,
-    fourier::{Fourier, max_order},
+    fourier::{Fourier, complex_forward, max_order},
     golden_section,
     statistics::upper_median,
 };
@@ -187,7 +185,7 @@ impl Lines {
     /// Threads and signed axial frequency of the strongest line, where one stands out.
     fn strongest(&self) -> Option<(usize, f64)> {
         let length = (FINER * self.rows).next_power_of_two();
-        let transform = FftPlanner::new().plan_fft_forward(length);
+        let transform = complex_forward(length);
         let mut scratch = vec![Complex64::ZERO; transform.get_inplace_scratch_len()];
         let mut block = vec![Complex64::ZERO; TOGETHER * length];
         let step = (length as f64 * self.dy_mm).recip();

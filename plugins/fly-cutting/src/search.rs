@@ -6,8 +6,7 @@
 
 use std::f64::consts::TAU;
 
-use runout_core::Complex64;
-use rustfft::FftPlanner;
+use runout_core::{Complex64, numerics::fourier::complex_forward};
 
 use crate::{
     heights::{Heights, Row},
@@ -155,7 +154,7 @@ impl Left<'_> {
             .take_while(|whole| *whole <= first.max(highest as f64))
             .collect();
         let wholes: &[f64] = if apart.is_finite() { &wholes } else { &[0.0] };
-        let transform = FftPlanner::new().plan_fft_forward(length);
+        let transform = complex_forward(length);
         let mut sums = vec![Complex64::ZERO; wholes.len() * length];
         let mut row_sums = vec![Complex64::ZERO; length];
         for row in &self.heights.rows {

@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
-use realfft::{ComplexToReal, RealFftPlanner};
-use rustfft::FftPlanner;
-
 use super::HeightMap;
-use runout_numerics::Complex64;
+use runout_numerics::{
+    Complex64,
+    fourier::{ComplexToReal, complex_forward, complex_inverse, real_forward, real_inverse},
+};
 
 /// Columns that are transformed together, for the sake of cache lines.
 const TOGETHER: usize = 8;
@@ -71,8 +71,7 @@ pub(super) fn correlate(map: &HeightMap, heights: &[f64], mut visit: impl FnMut(
     let (rows, columns) = (map.rows(), map.columns());
     let pad = if map.closed() { 1 } else { 2 };
     let (width, height) = (pad * columns, 2 * rows);
-    let mut real = RealFftPlanner::new();
-    let (forward, inverse) = (real.plan_fft_forward(width), real.plan_fft_inverse(width));
+    let (forward, inverse) = (real_forward(width), real_inverse(width));
     let bins = width / 2 + 1;
     let mut spectrum = vec![Complex64::ZERO; rows * bins];
     let mut line = forward.make_input_vec();
@@ -84,8 +83,7 @@ pub(super) fn correlate(map: &HeightMap, heights: &[f64], mut visit: impl FnMut(
         let _ = forward.process_with_scratch(&mut line, target, &mut scratch[..forward.get_scratch_len()]);
     }
 
-    let mut planner = FftPlanner::new();
-    let (down, up) = (planner.plan_fft_forward(height), planner.plan_fft_inverse(height));
+    let (down, up) = (complex_forward(height), complex_inverse(height));
     let mut column_scratch = vec![Complex64::ZERO; down.get_inplace_scratch_len().max(up.get_inplace_scratch_len())];
     let mut block = vec![Complex64::ZERO; TOGETHER * height];
     for first in (0..bins).step_by(TOGETHER) {

@@ -8,11 +8,11 @@
 
 use std::{f64::consts::PI, sync::Arc};
 
-use realfft::{RealFftPlanner, RealToComplex};
-use rustfft::{Fft, FftPlanner};
-
 use super::HeightMap;
-use runout_numerics::Complex64;
+use runout_numerics::{
+    Complex64,
+    fourier::{Fft, RealToComplex, complex_forward, real_forward},
+};
 
 /// Rays over half a turn: steps of 0.5°.
 const ANGLES: usize = 360;
@@ -71,8 +71,8 @@ impl Directions {
         let part_mm = (columns as f64 * dx_mm).min(rows as f64 * dy_mm);
         let across = if map.closed() { Side::closed(columns, dx_mm) } else { Side::open(columns, dx_mm, part_mm) };
         let along = Side::open(rows, dy_mm, part_mm);
-        let forward = RealFftPlanner::new().plan_fft_forward(across.length);
-        let down = FftPlanner::new().plan_fft_forward(along.length);
+        let forward = real_forward(across.length);
+        let down = complex_forward(along.length);
         let mut found = Self { columns, across, along, window: Vec::new(), forward, down };
         found.window = found.row_spectra(&vec![1.0; columns], 0);
         found

@@ -9,7 +9,6 @@
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
-use realfft::RealFftPlanner;
 
 use super::{
     HeightMap,
@@ -19,6 +18,7 @@ use super::{
 };
 use runout_numerics::{
     Complex64,
+    fourier::{real_forward, real_inverse},
     lanes::{NullaryFnOnce, vectorised},
 };
 
@@ -64,7 +64,7 @@ struct Planes {
 
 impl Planes {
     fn of(heights_um: &[f64], columns: usize) -> Self {
-        let forward = RealFftPlanner::new().plan_fft_forward(columns);
+        let forward = real_forward(columns);
         let (mut signal, mut line, mut scratch) =
             (forward.make_input_vec(), forward.make_output_vec(), forward.make_scratch_vec());
         let (count, bins) = (heights_um.len() / columns * line.len(), line.len());
@@ -203,7 +203,7 @@ impl<'a> SpatialDraws<'a> {
     /// Sums of products at the lags kept, with errors added and taken away.
     fn autocorrelations(&self, errors: &Planes) -> [Vec<f64>; 2] {
         let columns = self.map.columns();
-        let inverse = RealFftPlanner::new().plan_fft_inverse(columns);
+        let inverse = real_inverse(columns);
         let (mut line, mut row, mut scratch) =
             (inverse.make_input_vec(), inverse.make_output_vec(), inverse.make_scratch_vec());
         let mut both = [self.sums.clone(), self.sums.clone()];

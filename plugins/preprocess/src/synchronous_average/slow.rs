@@ -9,15 +9,17 @@
 
 #![allow(clippy::inline_always, reason = "see runout_core::numerics::lanes")]
 
-use std::{cell::RefCell, f64::consts::TAU};
+use std::f64::consts::TAU;
 
 use runout_core::{
     Complex64,
     neighbours::Neighbours,
-    numerics::lanes::{Arithmetic, load},
+    numerics::{
+        fourier::complex_inverse,
+        lanes::{Arithmetic, load},
+    },
     profile::NEIGHBOURS,
 };
-use rustfft::FftPlanner;
 
 use super::size::Size;
 
@@ -115,7 +117,7 @@ impl Slow {
             return None;
         }
         let Size { channels, angles, orders } = size;
-        let transform = PLANNER.with_borrow_mut(|planner| planner.plan_fft_inverse(angles));
+        let transform = complex_inverse(angles);
         let mut scratch = vec![Complex64::ZERO; transform.get_inplace_scratch_len()];
         let mut signal = vec![Complex64::ZERO; angles];
         let mut coefficients = Vec::with_capacity(2 * self.neighbours);
@@ -145,9 +147,4 @@ impl Slow {
         }
         Some(coefficients)
     }
-}
-
-thread_local! {
-    /// Keeps the plans that it has made: captures of one recording mostly ask for the same.
-    static PLANNER: RefCell<FftPlanner<f64>> = RefCell::new(FftPlanner::new());
 }
