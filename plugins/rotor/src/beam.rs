@@ -6,11 +6,11 @@
 use std::f64::consts::PI;
 
 /// A 4 × 4 matrix of an element.
-pub(crate) type Square = [[f64; 4]; 4];
+pub type Square = [[f64; 4]; 4];
 
 /// A circular section of one material, in SI units.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Section {
+pub struct Section {
     /// Outer diameter, in m.
     pub outer: f64,
     /// Inner diameter, in m.
@@ -26,19 +26,22 @@ pub(crate) struct Section {
 }
 
 impl Section {
-    fn area(&self) -> f64 {
+    /// Area, in m².
+    #[must_use]
+    pub fn area(&self) -> f64 {
         PI / 4.0 * (self.outer.powi(2) - self.inner.powi(2))
     }
 
     /// Second moment of area about a diameter, in m⁴.
-    fn second_moment(&self) -> f64 {
+    #[must_use]
+    pub fn second_moment(&self) -> f64 {
         PI / 64.0 * (self.outer.powi(4) - self.inner.powi(4))
     }
 
     /// Cowper's shear coefficient of a hollow circle (Cowper 1966, J. Appl. Mech. 33, 335), m the ratio of the diameters:
     /// 6(1 + ν)(1 + m²)² / ((7 + 6ν)(1 + m²)² + (20 + 12ν)m²).
     #[must_use]
-    pub(crate) fn shear_coefficient(&self) -> f64 {
+    pub fn shear_coefficient(&self) -> f64 {
         let (nu, m2) = (self.poisson, (self.inner / self.outer).powi(2));
         let squared = (1.0 + m2).powi(2);
         6.0 * (1.0 + nu) * squared / ((7.0 + 6.0 * nu) * squared + (20.0 + 12.0 * nu) * m2)
@@ -47,7 +50,7 @@ impl Section {
 
 /// Matrices of an element.
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Element {
+pub struct Element {
     /// Stiffness of bending and shear.
     pub stiffness: Square,
     /// Mass of displacement and rotation.
@@ -67,7 +70,7 @@ const GAUSS: [(f64, f64); 4] = [
 impl Element {
     /// The element of a section with a length in m.
     #[must_use]
-    pub(crate) fn new(section: &Section, length: f64) -> Self {
+    pub fn new(section: &Section, length: f64) -> Self {
         let (bending, shearing) =
             (section.youngs * section.second_moment(), section.shear_coefficient() * section.shear * section.area());
         let phi = 12.0 * bending / (shearing * length * length);
@@ -138,61 +141,5 @@ impl Shape {
             curvature: scaled(curvature),
             shear: scaled(shear),
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    const STEEL: Section =
-        Section { outer: 0.05, inner: 0.02, youngs: 211e9, shear: 81.2e9, poisson: 0.3, density: 7810.0 };
-
-    fn times(matrix: &Square, vector: [f64; 4]) -> [f64; 4] {
-        std::array::from_fn(|i| (0..4).map(|j| matrix[i][j] * vector[j]).sum())
-    }
-
-    #[test]
-    fn rigid_motion_needs_no_force_and_has_the_body_s_inertia() {
-        let length = 0.12;
-        let element = Element::new(&STEEL, length);
-        let (shift, turn) = ([1.0, 0.0, 1.0, 0.0], [0.0, 1.0, length, 1.0]);
-        for motion in [shift, turn] {
-            for force in times(&element.stiffness, motion) {
-                assert!(force.abs() < 1e-12 * element.stiffness[0][0], "{force}");
-            }
-        }
-        let energy = |matrix: &Square, motion: [f64; 4]| -> f64 {
-            times(matrix, motion).iter().zip(motion).map(|(one, other)| one * other).sum()
-        };
-        let mass = STEEL.density * STEEL.area() * length;
-        assert!((energy(&element.mass, shift) / mass - 1.0).abs() < 1e-13);
-        // About the first node: a rod of two radii.
-        let inertia = mass * (length * length / 3.0 + (STEEL.outer.powi(2) + STEEL.inner.powi(2)) / 16.0);
-        assert!((energy(&element.mass, turn) / inertia - 1.0).abs() < 1e-13);
-        let polar = mass * (STEEL.outer.powi(2) + STEEL.inner.powi(2)) / 8.0;
-        assert!((energy(&element.polar, turn) / polar - 1.0).abs() < 1e-13);
-        assert!(energy(&element.polar, shift).abs() < 1e-18);
-    }
-
-    #[test]
-    fn a_cantilever_bends_by_bending_and_shear() {
-        // A short, thick one: shear is half of it. One element is exact for a force at its end.
-        let length = 0.06;
-        let element = Element::new(&STEEL, length);
-        let (a, b, d) = (element.stiffness[2][2], element.stiffness[2][3], element.stiffness[3][3]);
-        let deflection = d / (a * d - b * b);
-        let bending = length.powi(3) / (3.0 * STEEL.youngs * STEEL.second_moment());
-        let shear = length / (STEEL.shear_coefficient() * STEEL.shear * STEEL.area());
-        assert!((deflection / (bending + shear) - 1.0).abs() < 1e-12, "{deflection} {bending} {shear}");
-        assert!(shear > 0.3 * bending);
-    }
-
-    #[test]
-    fn cowper_s_coefficient_has_its_limits() {
-        let of = |inner: f64| Section { inner, ..STEEL }.shear_coefficient();
-        // Solid: 6(1 + ν)/(7 + 6ν) = 0.886; a thin tube: 2(1 + ν)/(4 + 3ν) = 0.531 (Cowper's table 1, ν = 0.3).
-        assert!((of(0.0) - 0.8864).abs() < 1e-4, "{}", of(0.0));
-        assert!((of(0.049_999_9) - 0.5306).abs() < 1e-4, "{}", of(0.049_999_9));
     }
 }

@@ -6,7 +6,7 @@
 
 mod assemble;
 mod avoid;
-mod beam;
+pub mod beam;
 mod crossings;
 mod equations;
 mod loader;

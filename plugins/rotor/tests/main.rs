@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 mod bad_input;
+mod beam;
 mod closed_forms;
 mod matrix_market;
 mod support;
