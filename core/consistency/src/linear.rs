@@ -65,7 +65,12 @@ pub fn judge(fit: LinearFit, structure: &Structure) -> Judgement {
             None if partition.count() < 2 => continue,
             _ => Level::Others,
         };
-        judgement.checks.extend(alike(&partition.name, &groups, level, "it is constant, smoothed or copied"));
+        judgement.checks.extend(alike(
+            &partition.name,
+            &groups,
+            level,
+            "its noise is less, or it is smoothed or copied",
+        ));
     }
     judgement.checks.extend(structure.shifts.iter().filter_map(|one| shift(fit, one, models.as_ref(), structure)));
     if correlated.is_none() {
@@ -131,8 +136,8 @@ impl Judgement {
         white: Errors,
         correlated: Option<(&OrderModels, &Correlated)>,
     ) {
-        let count = structure.of_kind(Kind::Blocks).count();
-        for partition in structure.of_kind(Kind::Blocks) {
+        let count = structure.independent().count();
+        for partition in structure.independent() {
             let blocks = partition.count();
             let chance = widening(blocks) / count as f64;
             let plain = dispersion(fit.weights, fit.basis, fit.residual, &partition.members(), white);
@@ -203,7 +208,7 @@ fn shift(fit: LinearFit, parts: &Shift, models: Option<&OrderModels>, structure:
     let plain = f_tail(f, parameters as f64, dof as f64);
     let carried = models.filter(|models| models.is_correlated()).and_then(|models| models.evidence(&parts.columns));
     // Parts that are the blocks have nothing beside them that their offsets could be compared with.
-    let blocks = structure.of_kind(Kind::Blocks).filter(|blocks| blocks.name != parts.name);
+    let blocks = structure.independent().filter(|blocks| blocks.name != parts.name);
     let agreed = blocks.filter_map(|blocks| {
         let members = blocks.members();
         agreement(of_parts, fit.basis, fit.residual, &members).map(|(p, ..)| p)

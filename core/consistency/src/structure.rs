@@ -43,8 +43,10 @@ pub struct Partition {
 /// What the noise model says of the parts of a [`Partition`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
-    /// They are independent of each other.
+    /// They are independent of each other, and an effect has to agree on them.
     Blocks,
+    /// They are independent of each other; what an effect is along them is not known well enough while it is looked for.
+    Independent,
     /// They have the same noise level.
     Alike,
 }
@@ -114,6 +116,11 @@ impl Structure {
     #[must_use]
     pub fn naming(self, rows: Vec<String>) -> Self {
         Self { rows, ..self }
+    }
+
+    /// Partitions into parts that are independent of each other.
+    pub fn independent(&self) -> impl Iterator<Item = &Partition> {
+        self.partitions.iter().filter(|partition| partition.kind != Kind::Alike)
     }
 
     /// Partitions of one kind.

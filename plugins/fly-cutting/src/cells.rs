@@ -37,6 +37,8 @@ pub(crate) struct Cells {
     first: i32,
     passes: usize,
     bins: usize,
+    /// Whether each bin is one row.
+    is_by_row: bool,
 }
 
 impl Cells {
@@ -70,7 +72,7 @@ impl Cells {
             cells.push(Cell { y_mm: cell.y_mm / cell.points, angle: cell.angle / cell.points, ..cell });
         }
         of.iter_mut().for_each(|index| *index = place[*index]);
-        Self { all: cells, of, first, passes, bins }
+        Self { all: cells, of, first, passes, bins, is_by_row: bins == rows }
     }
 
     /// Passes from the first to the last.
@@ -111,6 +113,9 @@ impl Cells {
     pub(crate) fn structure(&self) -> Structure {
         let groups = self.all.iter().map(|cell| self.group(cell.pass)).collect();
         let names = (1..=self.groups()).map(|number| format!("pass {number}")).collect();
+        // Material repeats no row, an instrument that reads row after row may.
+        let rows = self.all.iter().map(|cell| cell.bin).collect();
+        let row_names = (1..=self.bins).map(|number| format!("row {number}")).collect();
         let halves: Vec<usize> = self.all.iter().map(|cell| usize::from(2 * cell.bin >= self.bins)).collect();
         Structure::default()
             .along(
@@ -119,6 +124,7 @@ impl Cells {
                 self.all.iter().map(|cell| cell.y_mm).collect(),
             )
             .divided(self.groups_name(), Kind::Blocks, groups, names)
+            .divided(if self.is_by_row { "rows" } else { "groups of rows" }, Kind::Independent, rows, row_names)
             .shifting("halves", &halves, &["lower", "upper"].map(|half| format!("the {half} half of the map")))
     }
 

@@ -214,6 +214,47 @@ fn unknown_noise_is_said() {
     assert_eq!(clean.diagnosis.verdict, Verdict::NothingFound, "{}", listing(&clean.diagnosis));
 }
 
+/// An instrument that reads row after row has an error of each: with it tilt across the rows and synchronous motion are known far worse, and it is said.
+#[test]
+fn errors_of_whole_rows_are_in_the_uncertainty() {
+    let trials = crate::trials::trials(20) as u64;
+    for (stated, row_nm) in [("", 0.06), ("", 0.5), ("stated_std_nm = 0\n", 0.5)] {
+        let (mut outside, mut unsaid) = ([0; 2], 0);
+        for seed in 0..trials {
+            let text = format!(
+                "noise_nm = 0.2\nseed = {seed}\n{stated}[[effect]]\nplugin = 'workpiece-tilt'\nx_urad = 5.0\ny_urad = -8.0\n"
+            );
+            let mut grid = scenario(SIDE, &text).heights().unwrap();
+            let mut normal = normals(seed);
+            for row in grid.height_nm.chunks_exact_mut(SIDE) {
+                let error_nm = row_nm * normal();
+                row.iter_mut().for_each(|height_nm| *height_nm += error_nm);
+            }
+            let found = diagnose(grid, &separator(CUT)).diagnosis;
+            let of = |effect: &str| found.added.iter().find(|added| added.effect == effect);
+            let is_off = |[value, std]: [f64; 2], truth: f64| usize::from((value - truth).abs() > 2.5 * std);
+            outside[0] += of("workpiece-tilt").map_or(0, |tilt| is_off(parameter(tilt, "y"), -8.0));
+            outside[1] += of("synchronous-motion").map_or(0, |motion| is_off(parameter(motion, "order_2"), 0.0));
+            unsaid += usize::from(found.verdict == Verdict::Explained);
+        }
+        println!("{stated}{row_nm} nm: tilt and motion outside in {outside:?} of {trials}, unsaid in {unsaid}");
+        assert!(outside.iter().all(|outside| 8 * outside <= trials as usize), "{stated}{row_nm} nm: {outside:?}");
+        assert!(row_nm < 0.1 || unsaid == 0, "{stated}{row_nm} nm: {unsaid}");
+    }
+}
+
+/// Normal numbers by the sum of twelve.
+fn normals(seed: u64) -> impl FnMut() -> f64 {
+    let mut state = 97 * seed + 5;
+    move || {
+        let mut uniform = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+        };
+        (0..12).map(|_| uniform()).sum()
+    }
+}
+
 #[test]
 fn a_run_gives_the_surface_and_its_values() {
     let outcome = run(scenario(SIDE, "noise_nm = 0.1").heights().unwrap(), &separator(CUT));
