@@ -269,6 +269,9 @@ fn shifts_of(one: &AtSpeed, slowest: &AtSpeed, rig: &Rig) -> Vec<Row> {
 }
 
 /// x and y by least squares, each with its standard uncertainty; nothing of sensors along one line.
+///
+/// What a sensor's level is uncertain by is its own noise, or motion of the axis that all sensors see, each its component. Levels do not tell which:
+/// the larger of both counts.
 fn shift(changes: &[Change]) -> Option<[(f64, Option<f64>); 2]> {
     let sum = |of: &dyn Fn(&Change) -> f64| changes.iter().map(of).sum::<f64>();
     let [xx, xy, yy] = [
@@ -281,9 +284,14 @@ fn shift(changes: &[Change]) -> Option<[(f64, Option<f64>); 2]> {
     (determinant > ONE_LINE).then(|| {
         rows.map(|[first, second]| {
             let weight = |one: &Change| first * one.direction[0] + second * one.direction[1];
-            let variances = changes.iter().map(|one| Some(weight(one).powi(2) * one.variance?));
-            let variance: Option<f64> = variances.sum();
-            (sum(&|one| weight(one) * one.um), variance.map(f64::sqrt))
+            let errors: Option<Vec<(f64, [f64; 2])>> =
+                changes.iter().map(|one| Some((weight(one) * one.variance?.sqrt(), one.direction))).collect();
+            let std = errors.map(|errors| {
+                let own = errors.iter().map(|(error, _)| error * error).sum::<f64>().sqrt();
+                let along = |axis: usize| errors.iter().map(|(error, direction)| error * direction[axis]).sum::<f64>();
+                own.max(along(0).hypot(along(1)))
+            });
+            (sum(&|one| weight(one) * one.um), std)
         })
     })
 }
@@ -304,10 +312,8 @@ mod tests {
     fn a_shift_is_what_all_sensors_show_together() {
         let [(x, x_std), (y, y_std)] = shift(&[change(0.0, 3.0), change(120.0, -1.5), change(240.0, -1.5)]).unwrap();
         assert!((x - 3.0).abs() < 1e-12 && y.abs() < 1e-12, "{x} {y}");
-        // Of three unit vectors evenly around, the sum of squares along an axis is 3/2: 0.2/√1.5.
-        assert!(
-            (x_std.unwrap() - 0.2 / 1.5_f64.sqrt()).abs() < 1e-12 && (y_std.unwrap() - x_std.unwrap()).abs() < 1e-12
-        );
+        // Motion that all of them see is that of the axis; of noise of their own it would be 0.2/√1.5.
+        assert!((x_std.unwrap() - 0.2).abs() < 1e-12 && (y_std.unwrap() - x_std.unwrap()).abs() < 1e-12);
         assert!(shift(&[change(0.0, 3.0), change(180.0, -3.0)]).is_none(), "one line");
         let [(x, _), (y, _)] = shift(&[change(0.0, 1.0), change(90.0, -2.0)]).unwrap();
         assert!((x - 1.0).abs() < 1e-12 && (y + 2.0).abs() < 1e-12);
