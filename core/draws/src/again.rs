@@ -4,7 +4,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::uncertainty::{NORMAL_95, Uncertainty, student_95};
+use crate::uncertainty::{NORMAL_95, Uncertainty};
 
 /// Draws of each truth measured again.
 const DRAWS: usize = 200;
@@ -25,11 +25,10 @@ impl Draw {
         StandardNormal.sample(&mut self.0)
     }
 
-    /// A true standard deviation over the one found from so many degrees of freedom: √(ν/χ²), as wide as 95 % of all at most.
+    /// A true standard deviation over the one found from so many degrees of freedom: √(ν/χ²).
     pub fn true_std_ratio(&mut self, freedom: usize) -> f64 {
         let squares: f64 = (0..freedom).map(|_| self.normal().powi(2)).sum();
-        let widest = student_95(freedom as f64) / NORMAL_95;
-        (freedom as f64 / squares).sqrt().min(widest)
+        (freedom as f64 / squares).sqrt()
     }
 }
 
@@ -85,7 +84,7 @@ pub fn measured_again(
             widen([value - high, value - low]);
             if truth == Truth::Hidden {
                 let hidden = Sorted::of(measured.iter().map(|one| one.truth[index]));
-                widen(hidden.interval_95().map(|end| end - errors.mean()));
+                widen(hidden.interval_95().map(|end| end - errors.quantile(0.5)));
             }
         }
         Uncertainty::new(std, interval, Truth::ALL.len() * DRAWS)
@@ -103,16 +102,17 @@ impl Sorted {
         Self(numbers)
     }
 
-    fn mean(&self) -> f64 {
-        self.0.iter().sum::<f64>() / self.0.len() as f64
-    }
-
+    /// That of a normal distribution with the same interval: of few degrees of freedom the variance is infinite.
     fn std(&self) -> f64 {
-        let mean = self.mean();
-        (self.0.iter().map(|one| (one - mean).powi(2)).sum::<f64>() / (self.0.len() - 1) as f64).sqrt()
+        let [low, high] = self.interval_95();
+        (high - low) / (2.0 * NORMAL_95)
     }
 
     fn interval_95(&self) -> [f64; 2] {
-        [0.025, 0.975].map(|share| self.0[(share * (self.0.len() - 1) as f64).round() as usize])
+        [0.025, 0.975].map(|share| self.quantile(share))
+    }
+
+    fn quantile(&self, share: f64) -> f64 {
+        self.0[(share * (self.0.len() - 1) as f64).round() as usize]
     }
 }

@@ -46,7 +46,7 @@ pub(crate) fn remarks(approaches: &Approaches, noise: &Noise, terms: &Terms) -> 
         )),
         Runs::Differ => remarks.push(format!(
             "runs differ as a whole, by a standard deviation of {:.2} {unit}; {contain}",
-            noise.common[0]
+            noise.common_std()
         )),
     }
     if approaches.sides.len() == 1 {
@@ -147,14 +147,25 @@ impl Cells {
     pub(crate) fn measured_again(&self, noise: &Noise, draw: &mut Draw) -> (Self, Self) {
         let freedom = noise.runs - 1;
         let own = noise.own_std * draw.true_std_ratio(noise.freedom_own);
-        let mut wider = |of: [f64; 2]| of.map(|std| std * draw.true_std_ratio(freedom));
+        let mut wider = |parts: [[f64; 2]; 2]| {
+            parts.map(|part| {
+                let ratio = draw.true_std_ratio(freedom);
+                part.map(|std| std * ratio)
+            })
+        };
         let (common, apart) = (wider(noise.common), wider(noise.apart));
-        let mut drawn = |of: [f64; 2]| of.map(|std| std * draw.normal());
+        let mut drawn = |parts: [[f64; 2]; 2]| {
+            let [one, other] = parts.map(|part| {
+                let normal = draw.normal();
+                part.map(|std| std * normal)
+            });
+            [one[0] + other[0], one[1] + other[1]]
+        };
         let runs: Vec<[[f64; 2]; 2]> = (0..noise.runs).map(|_| [drawn(common), drawn(apart)]).collect();
         let (mut truth, mut again) = (self.clone(), self.clone());
         for (place, along) in noise.along.iter().enumerate() {
             let off = |[level, tilt]: [f64; 2]| level + tilt * along;
-            let size = |[level, tilt]: [f64; 2]| level.hypot(tilt * along);
+            let size = |[one, other]: [[f64; 2]; 2]| off(one).hypot(off(other));
             for side in 0..self.mean[place].len() {
                 let sign = if side == 0 { 1.0 } else { -1.0 };
                 let mut of = |[common, apart]: &[[f64; 2]; 2]| off(*common) + sign * off(*apart) + own * draw.normal();

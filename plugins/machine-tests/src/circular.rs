@@ -147,36 +147,62 @@ impl PointSeparator for Circular {
 }
 
 impl Circular {
-    /// What is known of each of the values: both paths are drawn together, each with its own errors.
+    /// What is known of each of the values: both paths are drawn together, each with its own errors; H, which is of their difference alone, with that.
     fn known(&self, paths: &Paths, means: &[Vec<f64>], noise: &Noise) -> Vec<Interval> {
+        let turns: Vec<f64> = paths.turns.iter().map(|turns| turns.len() as f64).collect();
+        let each: Vec<(&str, &[f64], f64)> = (paths.signs.iter().zip(means).zip(&turns))
+            .map(|((sign, mean), turns)| (if *sign > 0 { "+" } else { "-" }, mean.as_slice(), turns.recip()))
+            .collect();
+        let numbers = |means: &[Vec<f64>]| -> Vec<f64> {
+            self.values(paths, means).into_iter().flatten().map(|(_, value, _)| value).collect()
+        };
+        let mut known = self.drawn(paths, &each, noise, numbers);
+        if let ([first, second], Some(hysteresis)) = (means, known.get_mut(HYSTERESIS)) {
+            let apart: Vec<f64> = first.iter().zip(second).map(|(a, b)| a - b).collect();
+            let of_both = turns.iter().map(|turns| turns.recip()).sum();
+            let widest = |apart: &[Vec<f64>]| vec![apart[0].iter().fold(0.0_f64, |most, one| most.max(one.abs()))];
+            if let Some(own) = self.drawn(paths, &[("difference", &apart, of_both)], noise, widest).pop() {
+                *hysteresis = own;
+            }
+        }
+        known
+    }
+
+    /// What is known of values of profiles around the path: the name of each, its readings and the variance of a mean beside that of a turn.
+    fn drawn(
+        &self,
+        paths: &Paths,
+        of: &[(&str, &[f64], f64)],
+        noise: &Noise,
+        values: impl Fn(&[Vec<f64>]) -> Vec<f64> + Sync,
+    ) -> Vec<Interval> {
         let mut fourier = Fourier::new(paths.angles);
-        let seed_of = |sign: i8| seed(&["circular", &self.0.plane, if sign > 0 { "+" } else { "-" }]);
         let mut measured = Vec::new();
         let mut sources = Vec::new();
-        for ((mean, turns), sign) in means.iter().zip(&paths.turns).zip(&paths.signs) {
+        for (name, profile, of_mean) in of {
             let mut harmonics = vec![Complex64::ZERO; noise.variance.len()];
-            fourier.analyse(mean.iter().copied(), &mut harmonics);
-            let variance: Vec<f64> = noise.variance.iter().map(|variance| variance / turns.len() as f64).collect();
-            sources.push(vec![(seed_of(*sign), variance.iter().map(|variance| variance.sqrt().into()).collect())]);
+            fourier.analyse(profile.iter().copied(), &mut harmonics);
+            let variance: Vec<f64> = noise.variance.iter().map(|variance| variance * of_mean).collect();
+            let seed = seed(&["circular", &self.0.plane, name]);
+            sources.push(vec![(seed, variance.iter().map(|variance| variance.sqrt().into()).collect())]);
             let (squares, variance_from) = (noise.squares.clone(), VarianceFrom::OrdersBeside);
             measured.push(Measured { harmonics, variance, squares, variance_from, lowest: 0 });
         }
-        let Some(draws) = Draws::of(&measured, sources, seed_of(1)) else { return Vec::new() };
+        let Some(draws) = Draws::of(&measured, sources, seed(&["circular", &self.0.plane, "+"])) else {
+            return Vec::new();
+        };
         let profiles = draws.profiles(|_| Complex64::ONE, paths.angles, |_, _| ());
         profiles.values(|kind, errors, found| {
-            let means: Vec<Vec<f64>> = match errors {
-                None => profiles.undisturbed_um(kind).to_vec(),
-                Some(errors) => {
-                    let of_path = |(mean, errors): (&Vec<f64>, &DrawnErrors)| {
-                        let mut sum = Vec::with_capacity(mean.len());
-                        errors.added_to(mean, &mut sum);
-                        sum
-                    };
-                    profiles.undisturbed_um(kind).iter().zip(errors).map(of_path).collect()
-                }
+            let of_profile = |(profile, errors): (&Vec<f64>, &DrawnErrors)| {
+                let mut sum = Vec::with_capacity(profile.len());
+                errors.added_to(profile, &mut sum);
+                sum
             };
-            let values = self.values(paths, &means);
-            found.extend(values.into_iter().flatten().map(|(_, value, _)| value));
+            let undisturbed = profiles.undisturbed_um(kind);
+            found.extend(match errors {
+                None => values(undisturbed),
+                Some(errors) => values(&undisturbed.iter().zip(errors).map(of_profile).collect::<Vec<_>>()),
+            });
         })
     }
 
@@ -212,7 +238,7 @@ impl Circular {
             values.insert(0, ("G_b".into(), zone(&points)?, "bidirectional circular deviation (ISO 230-4)"));
             let [ahead, behind] = [&about[..first.len()], &about[first.len()..first.len() + second.len()]];
             let widest = ahead.iter().zip(behind).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-            values.insert(1, ("H".into(), widest, "circular hysteresis (ISO 230-4)"));
+            values.insert(HYSTERESIS, ("H".into(), widest, "circular hysteresis (ISO 230-4)"));
         }
         // The circle about the least-squares centre that the nominal one is.
         let deviation = circle.deviation_um;
@@ -231,6 +257,9 @@ impl Circular {
         Some(values)
     }
 }
+
+/// Place of H among the values.
+const HYSTERESIS: usize = 1;
 
 /// Radius, centre and lobes of each turn over the turns of its direction, order by order: they drift, or one turn is unlike the others.
 fn low_orders(paths: &Paths) -> Vec<Check> {

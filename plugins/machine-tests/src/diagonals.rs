@@ -103,7 +103,7 @@ impl Diagonal {
 
     /// By so much noise moves one of its values at most, in µm: three standard deviations of the difference of two means.
     fn reach(&self) -> f64 {
-        let of_runs = self.noise.common.iter().chain(&self.noise.apart).map(|std| std * std).sum::<f64>();
+        let of_runs = self.noise.common.iter().chain(&self.noise.apart).flatten().map(|std| std * std).sum::<f64>();
         let run = of_runs.sqrt().hypot(self.noise.own_std);
         3.0 * std::f64::consts::SQRT_2 * run / (self.noise.runs as f64).sqrt()
     }

@@ -19,6 +19,7 @@
 //! 97.5 % quantile of the former. It holds for every course of means. Where an axis is farthest out in the first or the last window, it went on
 //! within that by half of the change to the next one: so much the upper end is higher.
 
+mod axis;
 mod course;
 
 use runout_core::{
@@ -34,22 +35,17 @@ use runout_core::{
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use course::{OF_SECOND_DIFFERENCES, levels, noise_of, range, rounding_of, smoothed, stable_after, within_ends};
+use axis::{Axis, BESIDE};
+use course::{levels, range, rounding_of, stable_after};
 
 /// Means that a test has at least: fewer show neither their noise nor a course.
 const FEWEST_MEANS: usize = 20;
 /// Share of an axis's own range that is stable where no length is stated.
 const STABLE: f64 = 0.1;
-/// Means on each side of one that stability is looked at over.
-const BESIDE: usize = 2;
-/// Windows so many standard deviations of a mean below the farthest one are not farther out: noise does that to one in 1e6 pairs.
-const REACH: f64 = 7.0;
 /// Draws of the noise.
 const DRAWS: usize = 1000;
 /// Standard deviations of a smoothed mean by which noise moves a band in or out at most.
 const AT_MOST: f64 = 3.0;
-/// Share of a range that one window alone may be of it without a remark.
-const MATTERS: f64 = 0.05;
 /// Windows with less than this share of the readings of most are left out.
 const FILLED: f64 = 0.5;
 
@@ -147,11 +143,13 @@ impl Drift {
         let names: Vec<&str> = test.axes.iter().map(|axis| axis.name).collect();
         let found = with_combined(test.axes.iter().map(|axis| range(&axis.means)).collect());
         let mut draw = Draw::new(seed(&["drift", &names.join("")]));
-        let mut drawn = |of: fn(&Axis, &mut Draw) -> f64| -> Vec<Vec<f64>> {
-            let mut one = || with_combined(test.axes.iter().map(|axis| of(axis, &mut draw)).collect());
-            (0..DRAWS).map(|_| one()).collect()
-        };
-        let (lows, highs) = (drawn(Axis::least), drawn(Axis::most));
+        let (lows, highs): (Vec<_>, Vec<_>) = (0..DRAWS)
+            .map(|_| {
+                let ends = test.axes.iter().map(|axis| axis.ends(&mut draw));
+                let (low, high) = ends.unzip();
+                (with_combined(low), with_combined(high))
+            })
+            .unzip();
         let mut values: Vec<Value> = Vec::new();
         let mut squares = 0.0;
         for (index, value) in found.into_iter().enumerate() {
@@ -172,16 +170,20 @@ impl Drift {
             };
             let uncertainty = Some(of_interval([low, high], DRAWS));
             let of = names.get(index).map(|name| (*name).to_owned());
-            values.push(Value { of, uncertainty, ..Value::new(symbol, value, f64::NAN, "um", about) }.key());
+            let alone = match test.axes.get(index) {
+                Some(axis) => axis.alone(&test.times_min),
+                None => test.axes.iter().find_map(|axis| axis.alone(&test.times_min)),
+            };
+            let value = Value { of, uncertainty, ..Value::new(symbol, value, f64::NAN, "um", about) };
+            values.push(value.refuted_by(alone).key());
         }
         for axis in &test.axes {
             remarks.extend((axis.left_out > 0).then(|| {
                 format!(
-                    "{} of the readings of {} are far from the others of their window: left out",
-                    axis.left_out, axis.name
+                    "readings of {} that are far from the others of their window, and left out: {}",
+                    axis.name, axis.left_out
                 )
             }));
-            remarks.extend(axis.alone(&test.times_min));
             values.extend(self.stability(test, axis, remarks));
         }
         values
@@ -204,11 +206,20 @@ impl Drift {
         let at = |band_um: f64| stable_after(&axis.smooth, band_um);
         let earliest = at(band_um + noise_um).unwrap_or(after).saturating_sub(BESIDE + 1);
         let latest = at(band_um - noise_um).unwrap_or(last) + 1;
+        let put_right = axis.put_right();
+        let moved = stable_after(&put_right.smooth, band_um).filter(|other| !(earliest..=latest).contains(other));
+        let alone = moved.map(|other| {
+            format!(
+                "without windows that are unlike those beside them, {} is stable after {:.1} min",
+                axis.name,
+                minutes(other)
+            )
+        });
         let about =
             "time from which on the axis stays within the band about its last position (criterion of this program)";
         let uncertainty = Some(of_interval([minutes(earliest), minutes(latest)], 0));
         let value = Value::new("stable-after", minutes(after), f64::NAN, "min", about);
-        Some(Value { uncertainty, ..value }.of(axis.name))
+        Some(Value { uncertainty, ..value }.refuted_by(alone).of(axis.name))
     }
 }
 
@@ -221,54 +232,6 @@ fn of_interval(interval_95: [f64; 2], draws: usize) -> Uncertainty {
 fn with_combined(mut ranges: Vec<f64>) -> Vec<f64> {
     ranges.push(ranges.iter().map(|range| range * range).sum::<f64>().sqrt());
     ranges
-}
-
-/// One axis: means over the windows, smoothed a little, and the noise of one.
-struct Axis {
-    name: &'static str,
-    means: Vec<f64>,
-    smooth: Vec<f64>,
-    noise_um: f64,
-    /// By how much readings may be rounded that stay as they are for most of the time.
-    rounding_um: f64,
-    /// Readings that are far from the others of their window.
-    left_out: usize,
-}
-
-impl Axis {
-    /// The range less what noise may have raised it by.
-    fn least(&self, draw: &mut Draw) -> f64 {
-        let farthest = |sign: f64| {
-            let out = self.means.iter().map(|mean| sign * mean).fold(f64::NEG_INFINITY, f64::max);
-            let near = self.means.iter().filter(|mean| sign * **mean >= out - REACH * self.noise_um);
-            near.count().max(1)
-        };
-        let mut largest = |count: usize| (0..count).map(|_| draw.normal()).fold(f64::NEG_INFINITY, f64::max);
-        (range(&self.means) - self.noise_um * (largest(farthest(1.0)) + largest(farthest(-1.0)))).max(0.0)
-    }
-
-    /// What is said where the range is that of one window, unlike those beside it.
-    fn alone(&self, times_min: &[f64]) -> Option<String> {
-        let whole = range(&self.means);
-        let stands_out = |place: usize| {
-            let beside = 0.5 * (self.means[place - 1] + self.means[place + 1]);
-            (self.means[place] - beside).abs() > REACH * OF_SECOND_DIFFERENCES.sqrt() * self.noise_um
-        };
-        (1..self.means.len() - 1).filter(|place| stands_out(*place)).find_map(|place| {
-            let others = range(&[&self.means[..place], &self.means[place + 1..]].concat());
-            (others < (1.0 - MATTERS) * whole).then(|| {
-                format!(
-                    "the range of {} is {whole:.3} µm by one window alone, at {:.1} min: {others:.3} µm without it; look at its readings",
-                    self.name, times_min[place]
-                )
-            })
-        })
-    }
-
-    /// The range and what noise may have taken from it, and means over windows.
-    fn most(&self, draw: &mut Draw) -> f64 {
-        (range(&self.means) + within_ends(&self.means) + self.noise_um * (draw.normal() - draw.normal())).max(0.0)
-    }
 }
 
 struct Test {
@@ -324,8 +287,7 @@ impl Test {
             .filter_map(|(column, name)| {
                 let readings = points.column(column).ok()?;
                 let (means, left_out) = windows(readings);
-                let (noise_um, rounding_um) = (noise_of(&means), rounding_of(readings));
-                Some(Axis { name, smooth: smoothed(&means, BESIDE), noise_um, rounding_um, means, left_out })
+                Some(Axis { left_out, ..Axis::new(name, means, rounding_of(readings)) })
             })
             .collect();
         if axes.is_empty() {

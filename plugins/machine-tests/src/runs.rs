@@ -54,12 +54,6 @@ impl Approaches {
                 .of(ErrorKind::InsufficientData)
                 .help(help.to_owned())
         };
-        let side = match direction {
-            Some(column) => {
-                stated(column).map_err(|problem| refuse(problem, "1 is the positive direction, -1 the negative one"))?
-            }
-            None => followed(given),
-        };
         let mut targets = given.to_vec();
         targets.sort_by(f64::total_cmp);
         let travel = targets.last().zip(targets.first()).map_or(0.0, |(last, first)| last - first);
@@ -68,6 +62,17 @@ impl Approaches {
             let found = format!("expected at least 2 target positions, found {}", targets.len());
             return Err(refuse(found, "name the commanded position of each row in the column of targets"));
         }
+        let side = match direction {
+            Some(column) => {
+                stated(column).map_err(|problem| refuse(problem, "1 is the positive direction, -1 the negative one"))?
+            }
+            None => followed(given, SAME_TARGET * travel).map_err(|problem| {
+                refuse(
+                    problem,
+                    "add the column `direction`, 1 or -1, or keep the rows in the order in which they were measured",
+                )
+            })?,
+        };
         let sides: Vec<i8> = [1, -1].into_iter().filter(|one| side.contains(one)).collect();
         let mut deviations = vec![vec![Vec::new(); sides.len()]; targets.len()];
         let mut rows = vec![vec![Vec::new(); sides.len()]; targets.len()];
@@ -87,7 +92,7 @@ impl Approaches {
                     );
                     return Err(refuse(
                         found,
-                        "approach each target equally often from each side; ISO 230-2 asks for 5 times",
+                        "targets are commanded positions, the same in all runs; approach each equally often from each side, by ISO 230-2 5 times",
                     ));
                 }
             }
@@ -138,8 +143,8 @@ impl Approaches {
         let cells = self.targets.len() * sides;
         let squares_along = along.iter().map(|place| place * place).sum::<f64>();
         let (mut course, mut own) = (Vec::new(), 0.0);
-        // Squares of what both sides of a run have in common, and of half of what they are apart by: level and tilt.
-        let (mut common, mut apart) = ([0.0; 2], [0.0; 2]);
+        // Level and tilt of what both sides of a run have in common, and of half of what they are apart by.
+        let (mut common, mut apart) = (Vec::new(), Vec::new());
         for run in 0..runs {
             let of_side = |side: usize| {
                 let left = |place: usize| {
@@ -155,23 +160,20 @@ impl Approaches {
             let each: Vec<([f64; 2], f64)> = (0..sides).map(of_side).collect();
             own += each.iter().map(|(_, squares)| squares).sum::<f64>();
             let [first, last] = [each[0].0, each[sides - 1].0];
-            for part in 0..2 {
-                common[part] += (0.5 * (first[part] + last[part])).powi(2);
-                apart[part] += (0.5 * (first[part] - last[part])).powi(2);
-            }
+            common.push([0, 1].map(|part| 0.5 * (first[part] + last[part])));
+            apart.push([0, 1].map(|part| 0.5 * (first[part] - last[part])));
             course.push(0.5 * (first[0] + last[0]));
         }
         let freedom = runs - 1;
         let freedom_own = (cells - 2 * sides).max(1) * freedom;
-        let of_runs = |squares: f64| (squares / freedom as f64).sqrt();
         Noise {
             copies: self
                 .deviations
                 .iter()
                 .flatten()
                 .all(|runs| runs.iter().all(|one| one.to_bits() == runs[0].to_bits())),
-            common: common.map(of_runs),
-            apart: apart.map(of_runs),
+            common: principal(&common),
+            apart: principal(&apart),
             own_std: (own / freedom_own as f64).sqrt(),
             course,
             along,
@@ -186,10 +188,11 @@ impl Approaches {
 pub(crate) struct Noise {
     /// Deviation of each run at all targets, from the mean of the runs.
     pub course: Vec<f64>,
-    /// Standard deviations of a run at all targets, and of what grows along the travel to its ends: of the mean of both sides.
-    pub common: [f64; 2],
+    /// What a run is off by as a whole, of the mean of both sides: two parts that do not depend on each other, each the level and what grows along the
+    /// travel to its ends, of one standard deviation.
+    pub common: [[f64; 2]; 2],
     /// The same of half of what the sides are apart by.
-    pub apart: [f64; 2],
+    pub apart: [[f64; 2]; 2],
     pub own_std: f64,
     /// Places along the travel: two apart at its ends, 0 on average.
     pub along: Vec<f64>,
@@ -211,7 +214,7 @@ impl Noise {
     /// What the runs do as a whole, each the mean of so many approaches.
     pub(crate) fn of_whole_runs(&self, approaches: usize) -> Runs {
         let std = self.own_std / (approaches as f64).sqrt();
-        if !(self.common[0] > OFF * std && std > 0.0) {
+        if !(self.common_std() > OFF * std && std > 0.0) {
             return Runs::Alike;
         }
         let steps = || self.course.windows(2).map(|pair| pair[1] - pair[0]);
@@ -219,6 +222,12 @@ impl Noise {
         let drifts =
             (self.runs >= FEWEST_FOR_A_TREND && self.trend().abs() > TREND) || (self.runs >= FEWEST_IN_TURN && in_turn);
         if drifts { Runs::Drift } else { Runs::Differ }
+    }
+
+    /// Standard deviation of the level of a run.
+    pub(crate) fn common_std(&self) -> f64 {
+        let [one, other] = self.common;
+        one[0].hypot(other[0])
     }
 
     /// Correlation of the runs' deviations with their number.
@@ -232,6 +241,18 @@ impl Noise {
     }
 }
 
+/// Principal components of levels and tilts about 0: a scale that changes from run to run changes both alike.
+fn principal(runs: &[[f64; 2]]) -> [[f64; 2]; 2] {
+    let freedom = (runs.len() - 1) as f64;
+    let product = |a: usize, b: usize| runs.iter().map(|run| run[a] * run[b]).sum::<f64>() / freedom;
+    let (level, tilt, both) = (product(0, 0), product(1, 1), product(0, 1));
+    let (sin, cos) = (0.5 * (2.0 * both).atan2(level - tilt)).sin_cos();
+    [[cos, sin], [-sin, cos]].map(|[along, across]| {
+        let variance = level * along * along + 2.0 * both * along * across + tilt * across * across;
+        [along, across].map(|share| share * variance.max(0.0).sqrt())
+    })
+}
+
 /// Sides as a file states them.
 pub(crate) fn stated(column: &[f64]) -> std::result::Result<Vec<i8>, String> {
     let side = |(row, value): (usize, &f64)| match *value {
@@ -242,24 +263,32 @@ pub(crate) fn stated(column: &[f64]) -> std::result::Result<Vec<i8>, String> {
     column.iter().enumerate().map(side).collect()
 }
 
-/// Sides by the target before: the same target twice running was passed and approached from the other side, and a single step back begins a run anew,
-/// approached as its next target is.
-fn followed(targets: &[f64]) -> Vec<i8> {
+/// Sides by the target before: where the path turns, a target twice running was passed and approached from the other side, and a single step back
+/// begins a run anew, approached as its next target is. A target that follows itself elsewhere says nothing of its side, as in a table that was sorted.
+fn followed(targets: &[f64], same: f64) -> std::result::Result<Vec<i8>, String> {
     let step = |row: usize| {
         let next = targets.get(row).zip(targets.get(row.wrapping_sub(1)));
-        next.map_or(0, |(at, before)| i8::from(at > before) - i8::from(at < before))
+        next.map_or(0, |(at, before)| i8::from(at - before > same) - i8::from(before - at > same))
     };
     let mut sides: Vec<i8> = Vec::with_capacity(targets.len());
     for row in 0..targets.len() {
         let before = sides.last().copied().unwrap_or(-1);
         let (into, out) = (step(row), step(row + 1));
+        let is_last = row + 1 == targets.len();
+        if row > 0 && into == 0 && (step(row - 1) == 0 || !(is_last || out == -step(row - 1))) {
+            return Err(format!(
+                "row {}: target {} follows itself where the path does not turn: nothing says from which side it was approached",
+                row + 1,
+                targets[row]
+            ));
+        }
         let begins = row == 0 || (into == -before && out == before);
         sides.push(match if begins { out } else { into } {
             0 => -before,
             side => side,
         });
     }
-    sides
+    Ok(sides)
 }
 
 pub(crate) fn mean(values: &[f64]) -> f64 {
@@ -270,19 +299,4 @@ pub(crate) fn mean(values: &[f64]) -> f64 {
 pub(crate) fn std(values: &[f64]) -> f64 {
     let mean = mean(values);
     (values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / (values.len() - 1) as f64).sqrt()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::followed;
-
-    #[test]
-    fn sides_follow_from_the_order_of_the_targets() {
-        // Up, passed at the end, down, passed at the beginning, up.
-        assert_eq!(followed(&[0.0, 1.0, 2.0, 2.0, 1.0, 0.0, 0.0, 1.0]), [1, 1, 1, -1, -1, -1, 1, 1]);
-        // Up, back to the beginning, up.
-        assert_eq!(followed(&[0.0, 1.0, 2.0, 0.0, 1.0, 2.0]), [1; 6]);
-        // Up and down without the last target twice.
-        assert_eq!(followed(&[0.0, 1.0, 2.0, 1.0, 0.0, 1.0]), [1, 1, 1, -1, -1, 1]);
-    }
 }

@@ -86,6 +86,33 @@ fn what_cannot_be_evaluated_is_refused() {
     assert!(refused(&side).contains("row 2: expected a direction of 1 or -1"), "{}", refused(&side));
 }
 
+/// Rows in the order of the path say the sides; rows that were sorted do not.
+#[test]
+fn sides_follow_from_the_order_of_the_targets_where_they_can() {
+    let sides = |targets: &[f64], runs: usize| {
+        let targets = targets.repeat(runs);
+        let deviations = (0..targets.len()).map(|row| (row * 7 % 5) as f64).collect();
+        let found = outcome(positioning(), &[("target_mm", targets), ("deviation_um", deviations)])?;
+        let has = |symbol: &str| found.values.iter().any(|value| value.symbol == symbol);
+        Ok::<[bool; 2], runout_core::Error>([has("A+"), has("A-")])
+    };
+    // Up, passed at the end, down, passed at the beginning; up only; up and down without the last target twice.
+    assert_eq!(sides(&[0.0, 1.0, 2.0, 2.0, 1.0, 0.0], 3).unwrap(), [true, true]);
+    assert_eq!(sides(&[0.0, 1.0, 2.0], 3).unwrap(), [true, false]);
+    let turning = sides(&[0.0, 1.0, 2.0, 1.0], 3).unwrap_err().to_string();
+    assert!(turning.contains("at least 2 approaches of target 0 in direction +1, found 1"), "{turning}");
+    // Sorted by side, target and run; by target and side; by run and target.
+    for (sorted, runs) in [
+        (&[0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0][..], 2),
+        (&[0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0], 1),
+        (&[0.0, 0.0, 1.0, 1.0, 2.0, 2.0], 3),
+        (&[0.0, 1.0, 1.0, 2.0, 2.0, 3.0], 2),
+    ] {
+        let said = sides(sorted, runs).unwrap_err().to_string();
+        assert!(said.contains("follows itself where the path does not turn"), "{sorted:?}: {said}");
+    }
+}
+
 /// An ellipse of ±3 µm, 2 µm too large, whose clockwise path is 1 µm larger still; recorded 40 µm off centre.
 #[test]
 fn a_circle_has_the_values_of_its_geometry() {

@@ -170,7 +170,8 @@ fn readings_and_windows_that_stand_out_are_said() {
     };
     let said = |outcome: &Outcome, what: &str| outcome.remarks.iter().find(|remark| remark.contains(what)).cloned();
     let clean = separated("", &recorded(7, 0.3)).unwrap();
-    assert!(said(&clean, "are far").or(said(&clean, "by one window alone")).is_none(), "{:?}", clean.remarks);
+    assert!(said(&clean, "that are far").is_none(), "{:?}", clean.remarks);
+    assert!(clean.values.iter().all(|value| value.refuted_by.is_none()), "{:?}", clean.values);
     let mut points = recorded(7, 0.3);
     for second in (500..SECONDS).step_by(1000) {
         z(&mut points, second, if second % 3 == 0 { 500.0 } else { -500.0 });
@@ -179,11 +180,71 @@ fn readings_and_windows_that_stand_out_are_said() {
     let [with, without] = [&found, &clean].map(|outcome| value(outcome, "drift", Some("Z")).value);
     // A mean without one of its 60 readings of 0.3 µm noise.
     assert!((with - without).abs() < 0.02, "{with} for {without}");
-    assert!(said(&found, "29 of the readings of Z are far").is_some(), "{:?}", found.remarks);
+    assert!(
+        said(&found, "readings of Z that are far from the others of their window, and left out: 29").is_some(),
+        "{:?}",
+        found.remarks
+    );
     let mut points = recorded(7, 0.3);
     (20_000..20_060).for_each(|second| z(&mut points, second, 5.0));
-    let said = said(&separated("", &points).unwrap(), "by one window alone");
-    assert!(said.is_some_and(|said| said.contains("range of Z") && said.contains("333.5 min")));
+    let found = separated("", &points).unwrap();
+    for (symbol, of, refuted) in
+        [("drift", Some("Z"), true), ("drift", Some("X"), false), ("combined-drift", None, true)]
+    {
+        let by = value(&found, symbol, of).refuted_by.clone();
+        assert_eq!(by.is_some(), refuted, "{symbol} {of:?}: {by:?}");
+        assert!(by.is_none_or(|by| by.contains("range of Z") && by.contains("333.5 min")));
+    }
+}
+
+/// A machine that stands still, read once a minute: windows of two and of three readings, whose noise few means show.
+#[test]
+fn noise_of_few_readings_is_no_drift() {
+    let (mut above, mut left_out) = ([0; 2], 0);
+    let trials = 60;
+    for (window_s, above) in [120, 180].into_iter().zip(&mut above) {
+        for seed in 0..trials {
+            let mut random = StdRng::seed_from_u64(500 + seed);
+            let times = (0..361).map(|minute| 60.0 * f64::from(minute)).collect();
+            let mut columns = vec![Column { name: "time_s".into(), values: times }];
+            for name in ["x_um", "y_um", "z_um"] {
+                columns
+                    .push(Column { name: name.into(), values: (0..361).map(|_| 0.2 * noise(&mut random)).collect() });
+            }
+            let found = separated(&format!("window_s = {window_s}"), &Points { columns, ..Points::default() }).unwrap();
+            let drift = value(&found, "combined-drift", None);
+            *above += i32::from(drift.interval_95().unwrap()[0] > 0.0);
+            left_out += i32::from(found.remarks.iter().any(|remark| remark.contains("left out")));
+        }
+    }
+    println!(
+        "simulated: a drift that is none in {above:?} of {trials}, readings left out in {left_out} of {}",
+        2 * trials
+    );
+    // 5 % of 60 are 3; 8 or more are found in 1 of 100 such cases.
+    assert!(above.iter().all(|above| *above < 8) && left_out < 4, "{above:?} {left_out}");
+}
+
+/// A reading of 8 µm in a window of two, after an axis has come to rest: its value says that it hangs on that window.
+#[test]
+fn a_reading_far_off_is_in_no_time_to_stability_unsaid() {
+    let trials = 30;
+    let mut unsaid = 0;
+    for seed in 0..trials {
+        let mut random = StdRng::seed_from_u64(900 + seed);
+        let times: Vec<f64> = (0..361).map(|minute| 60.0 * f64::from(minute)).collect();
+        let at = |time: &f64| -4.0 * (1.0 - (-time / 2880.0).exp());
+        let mut read: Vec<f64> = times.iter().map(|time| at(time) + 0.2 * noise(&mut random)).collect();
+        read[random.random_range(150..360)] += 8.0;
+        // The course is within 1 µm of its end from 66 min on.
+        let columns =
+            [("time_s", times), ("x_um", read)].map(|(name, values)| Column { name: name.into(), values }).into();
+        let found = separated("window_s = 120\nstable_um = 1.0", &Points { columns, ..Points::default() }).unwrap();
+        let Some(stable) = found.values.iter().find(|value| value.symbol == "stable-after") else { continue };
+        let [low, high] = stable.interval_95().unwrap();
+        unsaid += i32::from(!(low..=high).contains(&66.6) && stable.refuted_by.is_none());
+    }
+    assert!(unsaid < 2, "{unsaid} of {trials}");
 }
 
 /// Z is within 1 µm of its end from when the truth is; Y swings and does not come to rest.

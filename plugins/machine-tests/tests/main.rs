@@ -8,6 +8,7 @@ mod drift;
 mod play;
 mod probing;
 mod rotary_path;
+mod runs;
 mod structural;
 mod support;
 #[path = "../../../tests/support/trials.rs"]

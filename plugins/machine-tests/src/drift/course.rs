@@ -1,5 +1,7 @@
 //! A course of means over windows: range, noise, and when it comes to rest.
 
+use std::f64::consts::SQRT_2;
+
 use runout_core::numerics::statistics::{median, median_absolute_deviation};
 
 /// Share of the test at its end that says where an axis is.
@@ -16,7 +18,9 @@ const FAR: f64 = 7.0;
 /// the usual one.
 pub(super) fn levels(windows: &[&[f64]]) -> (Vec<f64>, usize) {
     let spreads: Vec<f64> = windows.iter().map(|window| median_absolute_deviation(window) / NORMAL_MEDIAN).collect();
-    let usual = median(spreads.iter().copied());
+    // Of few readings the spread about their median is too small: what follows each other shows it too.
+    let changes = windows.iter().flat_map(|window| window.windows(2).map(|pair| (pair[1] - pair[0]).abs()));
+    let usual = median(spreads.iter().copied()).max(median(changes) / (SQRT_2 * NORMAL_MEDIAN));
     let mut left_out = 0;
     let level = |(window, spread): (&&[f64], &f64)| {
         let (center, far) = (median(window.iter().copied()), FAR * spread.max(usual));
@@ -63,9 +67,8 @@ pub(super) fn smoothed(means: &[f64], beside: usize) -> Vec<f64> {
 /// Standard deviation of the noise of means, from the median of their second differences: steps are few of them. Where most are 0, as of a
 /// coarse resolution, their root mean square.
 pub(super) fn noise_of(means: &[f64]) -> f64 {
-    let mut sizes: Vec<f64> = means.windows(3).map(|three| (three[1] - 0.5 * (three[0] + three[2])).abs()).collect();
-    sizes.sort_by(f64::total_cmp);
-    let median = sizes.get(sizes.len() / 2).copied().unwrap_or_default() / NORMAL_MEDIAN;
+    let sizes: Vec<f64> = means.windows(3).map(|three| (three[1] - 0.5 * (three[0] + three[2])).abs()).collect();
+    let median = median(sizes.iter().copied()) / NORMAL_MEDIAN;
     let rms = (sizes.iter().map(|size| size * size).sum::<f64>() / sizes.len().max(1) as f64).sqrt();
     (if median > 0.0 { median } else { rms }) / OF_SECOND_DIFFERENCES.sqrt()
 }
