@@ -31,7 +31,7 @@ use serde::Deserialize;
 
 use crate::{
     paths::{Paths, mean_of, refused},
-    repeated::{in_order, single},
+    repeated::{alike_series, in_order, single},
 };
 
 /// `[separate] plugin = "circular"`.
@@ -123,6 +123,7 @@ impl PointSeparator for Circular {
         }
         let mut checks = low_orders(&paths);
         checks.extend(unlike(&paths));
+        checks.extend(turns_alike(&paths, &noise));
         let named = |(index, (symbol, value, about)): (usize, (String, f64, &'static str))| {
             let known = known.get(index).and_then(|known| known.at(value));
             let known =
@@ -309,6 +310,18 @@ fn unlike(paths: &Paths) -> Option<Check> {
     single(&places, named, "µm")
 }
 
+/// Turns that are farther from the mean of their direction than others: a path that begins or ends within them.
+fn turns_alike(paths: &Paths, noise: &Noise) -> Vec<Check> {
+    let of_path = |(turns, sign): (&Vec<Vec<f64>>, &i8)| {
+        let path = if *sign > 0 { '+' } else { '-' };
+        let name = |number: usize| format!("turn {} of the {path} path", number + 1);
+        let series: Vec<(String, &[f64])> =
+            turns.iter().enumerate().map(|(number, turn)| (name(number), turn.as_slice())).collect();
+        alike_series("turns", &series, noise.freedom()).into_iter().map(|check| check.among(2))
+    };
+    paths.turns.iter().zip(&paths.signs).flat_map(of_path).collect()
+}
+
 /// Orders of a turn that warming up changes: radius, centre, squareness and gains of the axes.
 const HIGHEST_OF_TURNS: usize = 3;
 /// Turns of a direction from which on more than their radius is judged.
@@ -342,6 +355,12 @@ impl Noise {
         smooth_by_order(&mut sums, 1);
         let squares = (0..sums.len()).map(|order| 2 * freedom * (2 * orders_beside(order) + 1)).collect();
         Self { variance: sums.into_iter().map(|sum| sum.re / freedom.max(1) as f64).collect(), squares }
+    }
+
+    /// Independent readings that a turn counts for: of white noise all (Satterthwaite).
+    fn freedom(&self) -> f64 {
+        let sum = |of: fn(f64) -> f64| self.variance.iter().map(|variance| of(*variance)).sum::<f64>();
+        2.0 * sum(|variance| variance).powi(2) / sum(|variance| variance * variance).max(f64::MIN_POSITIVE)
     }
 
     /// Whether nothing changes: no two recorded turns are alike.

@@ -1,7 +1,11 @@
 //! What readings that were repeated say of themselves: the tests of [`consistency`](runout_core::consistency), which contradict values.
 
 use runout_core::{
-    consistency::{Action, Check, Judgement, Kind, LinearFit, Shift, Structure, Test, judge, rows},
+    consistency::{
+        Action, Check, Judgement, Kind, LinearFit, Shift, Structure, Test,
+        groups::{Group, Level, alike},
+        judge, rows,
+    },
     numerics::least_squares::Basis,
 };
 
@@ -206,3 +210,25 @@ pub(crate) fn single(places: &[Vec<f64>], named: impl Fn(usize, usize) -> String
     let found = rows::unlike_repeats(places)?;
     contradicting(vec![found.check(&Structure::default().naming(names), unit)]).pop()
 }
+
+/// Series at the same places: whether one of them is farther from their mean than the others. Of readings that depend on each other `freedom` is less
+/// than their number. A finding contradicts the values.
+pub(crate) fn alike_series(what: &str, series: &[(String, &[f64])], freedom: f64) -> Vec<Check> {
+    let count = series.len() as f64;
+    if series.len() < FEWEST_ALIKE {
+        return Vec::new();
+    }
+    let places = 0..series[0].1.len();
+    let means: Vec<f64> = places.map(|place| series.iter().map(|(_, of)| of[place]).sum::<f64>() / count).collect();
+    let group = |(name, of): &(String, &[f64])| {
+        let squares = of.iter().zip(&means).map(|(one, mean)| (one - mean).powi(2)).sum::<f64>();
+        // As many degrees of freedom as the series has, in place of its readings.
+        let share = freedom / of.len() as f64;
+        Group { name: name.clone(), squares: share * squares, freedom: freedom * (count - 1.0) / count }
+    };
+    let groups: Vec<Group> = series.iter().map(group).collect();
+    contradicting(alike(what, &groups, Level::Others, "its noise is less, or it is smoothed"))
+}
+
+/// Two series are as far from their mean as each other.
+const FEWEST_ALIKE: usize = 3;

@@ -53,3 +53,36 @@ fn intervals_hold_the_truth_of_play_and_of_nothing() {
         assert!(all >= 1.0 - 0.07 * (18.0 / trials as f64).sqrt(), "{play_um} µm, {readings}: {all}");
     }
 }
+
+/// A path that begins within the first turn: the turn is named, and no value is stated without that. Sound paths, also with noise that lasts, say nothing.
+#[test]
+fn a_path_that_begins_within_a_turn_is_said() {
+    let (readings, turns) = (360, 4);
+    let begins =
+        |readings: usize, step: usize, size_um: f64| size_um * (-(step as f64) / (0.05 * readings as f64)).exp();
+    let trials = crate::trials::trials(24) as u64;
+    for (size_um, lasting, said_of) in [(3.0, 0.0, true), (1.5, 0.0, true), (0.0, 0.0, false), (0.0, 0.9, false)] {
+        let mut said = 0;
+        for seed in 0..trials {
+            let mut chance = Chance::new(70 + seed);
+            let mut rows = Rows::new("", &["angle_deg", "deviation_um", "direction"]);
+            for side in [1.0, -1.0] {
+                let mut noise_um = 0.0;
+                for step in 0..turns * readings {
+                    let angle = side * TAU * step as f64 / readings as f64;
+                    noise_um = lasting * noise_um + 0.25 * (1.0_f64 - lasting * lasting).sqrt() * chance.normal();
+                    let own_um = 2.0 * (2.0 * angle).cos() + begins(readings, step, size_um);
+                    rows.push("", &[angle.to_degrees(), own_um + noise_um, side]);
+                }
+            }
+            let config = CircularConfig { plane: "XY".into(), radius_mm: RADIUS_MM, radius_std_um: 0.0 };
+            let found = separated(config, &rows).unwrap();
+            said += u64::from(found.values.iter().any(|value| value.refuted_by.is_some()));
+        }
+        println!("begins {size_um} µm off, noise that lasts {lasting}: said in {said} of {trials}");
+        assert!(
+            if said_of { 8 * said >= 7 * trials } else { 8 * said <= trials },
+            "{size_um} {lasting}: {said} of {trials}"
+        );
+    }
+}

@@ -3,6 +3,7 @@
 use runout_core::{
     Error, ErrorKind, Result,
     closed_loop::{self, Closed, Effect, Fit, Model, Setting, Settings, diagnosis::Diagnosis},
+    consistency::{Check, Test},
     points::Points,
     stage::{PointDiagnosis, PointModel},
 };
@@ -270,13 +271,13 @@ impl AxialReversal {
         ))
     }
 
-    /// What traces say of shifts against each other, for a run that does not look for them, and the fit without any.
-    pub(crate) fn contradictions(&self, points: &Points, traces: &Traces) -> Result<(Vec<String>, TracesFit)> {
+    /// What traces say against values of a run, which corrects no shift, and the fit without any.
+    pub(crate) fn contradictions(&self, points: &Points, traces: &Traces) -> Result<(Vec<Check>, TracesFit)> {
         let model = self.traces_model(points, traces, self.0.slide_cutoff_mm, &[])?;
         let settings =
             Settings { effects: Some(vec![REGISTRATION.into()]), max_added: traces.all.len(), ..Settings::default() };
         let closed = closed_loop::diagnose(&model, &settings)?;
-        let mut said = Vec::new();
+        let mut said = closed.before.consistency();
         let added = &closed.diagnosis.added;
         if !added.is_empty() {
             let shift = |one: &runout_core::closed_loop::diagnosis::Added| {
@@ -284,16 +285,23 @@ impl AxialReversal {
                 let others = if one.confounded_with.is_empty() { "" } else { " (or another trace against it)" };
                 format!("{} by {value:.3} mm{others}", one.targets.join(", "))
             };
-            said.push(format!(
-                "traces contradict each other through axial shifts: {}; with them the traces differ by {:.4} µm rms instead of {:.4}. \
-                 The straightness and its uncertainty do not hold this: `runout diagnose` corrects it",
+            let [before, after] = [&closed.diagnosis.before, &closed.diagnosis.after];
+            let ratio = (before.residual_rms_um / after.residual_rms_um).powi(2);
+            let dof = [added.len() as f64, after.degrees_of_freedom as f64];
+            let p = added.iter().map(|one| one.p_value).fold(1.0, f64::min);
+            said.push(Check::new(Test::Shift, "traces along the axis", ratio, &dof, p).finding(|| format!(
+                "traces contradict each other through axial shifts: {}; with them the traces differ by {:.4} µm rms instead of {:.4}: \
+                 `runout diagnose` corrects it",
                 added.iter().map(shift).collect::<Vec<_>>().join("; "),
-                closed.diagnosis.after.residual_rms_um,
-                closed.diagnosis.before.residual_rms_um,
-            ));
+                after.residual_rms_um,
+                before.residual_rms_um,
+            )));
         }
         if self.0.slide_cutoff_mm.is_none() {
-            said.extend(self.likely_shift(points, traces, closed.after.applied())?);
+            let likely = self.likely_shift(points, traces, closed.after.applied())?;
+            said.extend(
+                likely.map(|said| Check::new(Test::Shift, "setups along the axis", 0.0, &[], 0.0).finding(|| said)),
+            );
         }
         Ok((said, closed.before))
     }

@@ -2,7 +2,6 @@
 
 use runout_core::{
     Error, ErrorKind, Result,
-    closed_loop::Fit as _,
     fault::{Fault, known_names},
     numerics::number::significant,
     pipeline::{Context, StageConfig},
@@ -206,12 +205,11 @@ impl AxialReversal {
     pub fn separated(&self, points: &Points) -> Result<Straightness> {
         let traces = self.traces(points)?;
         let mut result = self.straightness(points, &traces, 1.0, None, None)?.0;
-        let (said, fit) = self.contradictions(points, &traces)?;
+        let (checks, fit) = self.contradictions(points, &traces)?;
         if let Some(errors) = fit.trace_errors() {
             result = self.straightness(points, &traces, 1.0, None, Some(&errors))?.0;
         }
-        result.checks = fit.consistency();
-        result.warnings.extend(said);
+        result.checks = checks;
         result.warnings.extend(not_reversed(&result, [&self.0.initial, &self.0.reversed]));
         finite(points, &result)?;
         Ok(result)
