@@ -217,7 +217,7 @@ fn unknown_noise_is_said() {
 /// An instrument that reads row after row has an error of each: with it tilt across the rows and synchronous motion are known far worse, and it is said.
 #[test]
 fn errors_of_whole_rows_are_in_the_uncertainty() {
-    let trials = crate::trials::trials(20) as u64;
+    let trials = crate::trials::trials(9) as u64;
     for (stated, row_nm) in [("", 0.06), ("", 0.5), ("stated_std_nm = 0\n", 0.5)] {
         let (mut outside, mut unsaid) = ([0; 2], 0);
         for seed in 0..trials {

@@ -13,12 +13,12 @@ use super::{
     trend::{RECORDING, recording_column},
 };
 use crate::summary::Summary;
-use runout_draws::Uncertainty;
 use runout_error::Result;
+use runout_numerics::statistics::student_95;
 use runout_table::{
     Array, ColumnSpec, Figure, Float64Array, Measure, RecordBatch, TableSpec, numbers, numbers_or_null, texts,
 };
-use runout_turning::rig::Rig;
+use runout_turning::{profile::NEIGHBOURS, rig::Rig};
 
 /// Speeds that differ by less, as a share, are one.
 const VARIED: f64 = 0.02;
@@ -219,11 +219,21 @@ impl Speeds {
     }
 }
 
-/// A sensor's mean reading less that of the slowest recording, with its variance.
+/// Degrees of freedom of a level's variance: that of a mean is known from frequencies beside it, which a real signal has twice.
+const OF_A_LEVEL: f64 = (2 * NEIGHBOURS) as f64;
+
+/// A sensor's mean reading less that of the slowest recording, with the standard uncertainties of both.
 struct Change {
     direction: [f64; 2],
     um: f64,
-    variance: Option<f64>,
+    std_um: Option<[f64; 2]>,
+}
+
+/// Standard uncertainty of a shift, and the degrees of freedom that it is known from.
+#[derive(Debug, Clone, Copy)]
+struct Known {
+    std_um: f64,
+    freedom: f64,
 }
 
 /// Where the axis of a recording is, relative to the slowest: of each station, setup and section.
@@ -250,17 +260,21 @@ fn shifts_of(one: &AtSpeed, slowest: &AtSpeed, rig: &Rig) -> Vec<Row> {
             changes.push(Vec::new());
             places.len() - 1
         });
-        let variance = before.std_um.zip(level.std_um).map(|(before, after)| before * before + after * after);
-        changes[index].push(Change { direction: [cos, sin], um: level.mean_um - before.mean_um, variance });
+        let std_um = before.std_um.zip(level.std_um).map(|(before, after)| [before, after]);
+        changes[index].push(Change { direction: [cos, sin], um: level.mean_um - before.mean_um, std_um });
     }
     let mut rows = Vec::new();
     for ((station, setup, section), changes) in places.into_iter().zip(&changes) {
         let Some(shift) = shift(changes) else { continue };
-        for (axis, (value, std)) in ["x", "y"].into_iter().zip(shift) {
+        for (axis, (value, known)) in ["x", "y"].into_iter().zip(shift) {
             let series = format!("axis-shift-{axis}, section {}, setup {setup}, {station} / um", rig.sections[section]);
             // The slowest is what the others are counted from.
-            let std = std.filter(|_| one.recording != slowest.recording);
-            let interval_95 = std.map(|std| Uncertainty::normal(value, std).interval_95);
+            let known = known.filter(|_| one.recording != slowest.recording);
+            let interval_95 = known.map(|Known { std_um, freedom }| {
+                let reach = student_95(freedom) * std_um;
+                [value - reach, value + reach]
+            });
+            let std = known.map(|known| known.std_um);
             let (recording, speed_rpm) = (one.recording.clone(), one.speed_rpm);
             rows.push(Row { recording, speed_rpm, series, value, std, interval_95 });
         }
@@ -268,11 +282,12 @@ fn shifts_of(one: &AtSpeed, slowest: &AtSpeed, rig: &Rig) -> Vec<Row> {
     rows
 }
 
-/// x and y by least squares, each with its standard uncertainty; nothing of sensors along one line.
+/// x and y by least squares, each with its standard uncertainty and the degrees of freedom that it is known from (Welch, Satterthwaite); nothing of
+/// sensors along one line.
 ///
 /// What a sensor's level is uncertain by is its own noise, or motion of the axis that all sensors see, each its component. Levels do not tell which:
 /// the larger of both counts.
-fn shift(changes: &[Change]) -> Option<[(f64, Option<f64>); 2]> {
+fn shift(changes: &[Change]) -> Option<[(f64, Option<Known>); 2]> {
     let sum = |of: &dyn Fn(&Change) -> f64| changes.iter().map(of).sum::<f64>();
     let [xx, xy, yy] = [
         sum(&|one| one.direction[0] * one.direction[0]),
@@ -284,14 +299,19 @@ fn shift(changes: &[Change]) -> Option<[(f64, Option<f64>); 2]> {
     (determinant > ONE_LINE).then(|| {
         rows.map(|[first, second]| {
             let weight = |one: &Change| first * one.direction[0] + second * one.direction[1];
-            let errors: Option<Vec<(f64, [f64; 2])>> =
-                changes.iter().map(|one| Some((weight(one) * one.variance?.sqrt(), one.direction))).collect();
-            let std = errors.map(|errors| {
-                let own = errors.iter().map(|(error, _)| error * error).sum::<f64>().sqrt();
+            let of = |recording: usize| -> Option<f64> {
+                let error = |one: &Change| Some((weight(one) * one.std_um?[recording], one.direction));
+                let errors: Vec<(f64, [f64; 2])> = changes.iter().map(error).collect::<Option<_>>()?;
+                let own = errors.iter().map(|(error, _)| error * error).sum::<f64>();
                 let along = |axis: usize| errors.iter().map(|(error, direction)| error * direction[axis]).sum::<f64>();
-                own.max(along(0).hypot(along(1)))
+                Some(own.max(along(0).powi(2) + along(1).powi(2)))
+            };
+            let known = of(0).zip(of(1)).map(|(before, after)| {
+                let variance = before + after;
+                let freedom = OF_A_LEVEL * variance * variance / (before * before + after * after);
+                Known { std_um: variance.sqrt(), freedom }
             });
-            (sum(&|one| weight(one) * one.um), std)
+            (sum(&|one| weight(one) * one.um), known)
         })
     })
 }
@@ -304,7 +324,7 @@ mod tests {
 
     fn change(angle_deg: f64, um: f64) -> Change {
         let (sin, cos) = angle_deg.to_radians().sin_cos();
-        Change { direction: [cos, sin], um, variance: Some(0.04) }
+        Change { direction: [cos, sin], um, std_um: Some([0.16, 0.12]) }
     }
 
     /// Three sensors at 0°, 120° and 240° that the axis comes nearer to by 3 µm along 0°: by cos 120° of it at the others.
@@ -313,7 +333,10 @@ mod tests {
         let [(x, x_std), (y, y_std)] = shift(&[change(0.0, 3.0), change(120.0, -1.5), change(240.0, -1.5)]).unwrap();
         assert!((x - 3.0).abs() < 1e-12 && y.abs() < 1e-12, "{x} {y}");
         // Motion that all of them see is that of the axis; of noise of their own it would be 0.2/√1.5.
-        assert!((x_std.unwrap() - 0.2).abs() < 1e-12 && (y_std.unwrap() - x_std.unwrap()).abs() < 1e-12);
+        let [Known { std_um: x_std, freedom }, Known { std_um: y_std, .. }] = [x_std.unwrap(), y_std.unwrap()];
+        assert!((x_std - 0.2).abs() < 1e-12 && (y_std - x_std).abs() < 1e-12);
+        // 0.16² and 0.12² from four degrees of freedom each.
+        assert!((freedom - 4.0 * 0.04_f64.powi(2) / (0.16_f64.powi(4) + 0.12_f64.powi(4))).abs() < 1e-9, "{freedom}");
         assert!(shift(&[change(0.0, 3.0), change(180.0, -3.0)]).is_none(), "one line");
         let [(x, _), (y, _)] = shift(&[change(0.0, 1.0), change(90.0, -2.0)]).unwrap();
         assert!((x - 1.0).abs() < 1e-12 && (y + 2.0).abs() < 1e-12);
