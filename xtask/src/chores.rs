@@ -53,25 +53,31 @@ pub(crate) fn test(foreign_readers: bool, complete: bool) -> Outcome {
     }
     run(&mut tests)?;
     clock.over("tests");
-    run(&mut linting(&["test", "--workspace", "--doc", "--quiet"])?)?;
-    clock.over("examples of the docs");
     let program = target().join("debug/runout");
     run_example(&program)?;
+    let examples_of_docs = || run(&mut linting(&["test", "--workspace", "--doc", "--quiet"])?);
     let package = || if foreign_readers { python::test() } else { Ok(()) };
     if complete {
         // Each of them takes one processor.
         std::thread::scope(|scope| {
             let program = program.display().to_string();
             let worker = target().join("debug/examples/many_command_lines").display().to_string();
-            let inputs = scope.spawn(move || fuzz::fuzz(&["--minutes", "1", &worker]));
+            let beside = scope.spawn(move || {
+                fuzz::fuzz(&["--minutes", "1", &worker])?;
+                examples_of_docs()
+            });
             kill_test::test(&["--kills", "60", &program])?;
             package()?;
-            inputs.join().map_err(|_| "the fuzz run ended early".to_owned())?
+            beside.join().map_err(|_| "fuzzing and the examples of the docs ended early".to_owned())?
         })?;
     } else {
+        examples_of_docs()?;
         package()?;
     }
-    clock.over(if complete { "fuzzing, kills and the Python package" } else { "the Python package" });
+    clock.over(match complete {
+        true => "fuzzing, kills, examples of the docs and the Python package",
+        false => "examples of the docs and the Python package",
+    });
     say(&clock.text());
     if !foreign_readers {
         say(

@@ -4,7 +4,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::uncertainty::{NORMAL_95, Uncertainty};
+use crate::uncertainty::{NORMAL_95, Uncertainty, student_95};
 
 /// Draws of each truth measured again.
 const DRAWS: usize = 200;
@@ -25,10 +25,11 @@ impl Draw {
         StandardNormal.sample(&mut self.0)
     }
 
-    /// A true standard deviation over the one found from so many degrees of freedom: √(ν/χ²).
+    /// A true standard deviation over the one found from so many degrees of freedom: √(ν/χ²). It is at most what Student's interval of one degree
+    /// of freedom is wider by than the normal one, 6.5: of one or two, intervals would say nothing.
     pub fn true_std_ratio(&mut self, freedom: usize) -> f64 {
         let squares: f64 = (0..freedom).map(|_| self.normal().powi(2)).sum();
-        (freedom as f64 / squares).sqrt()
+        (freedom as f64 / squares).sqrt().min(student_95(1.0) / NORMAL_95)
     }
 }
 

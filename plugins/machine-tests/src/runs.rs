@@ -166,15 +166,18 @@ impl Approaches {
         }
         let freedom = runs - 1;
         let freedom_own = (cells - 2 * sides).max(1) * freedom;
+        let own_variance = own / freedom_own as f64;
+        // What noise at single targets makes of level and tilt.
+        let of_own = [cells as f64, sides as f64 * squares_along].map(|weight| own_variance / weight);
         Noise {
             copies: self
                 .deviations
                 .iter()
                 .flatten()
                 .all(|runs| runs.iter().all(|one| one.to_bits() == runs[0].to_bits())),
-            common: principal(&common),
-            apart: principal(&apart),
-            own_std: (own / freedom_own as f64).sqrt(),
+            common: principal(&common, of_own),
+            apart: principal(&apart, of_own),
+            own_std: own_variance.sqrt(),
             course,
             along,
             runs,
@@ -241,11 +244,11 @@ impl Noise {
     }
 }
 
-/// Principal components of levels and tilts about 0: a scale that changes from run to run changes both alike.
-fn principal(runs: &[[f64; 2]]) -> [[f64; 2]; 2] {
+/// Principal components of levels and tilts about 0, less these variances of noise: a scale that changes from run to run changes both alike.
+fn principal(runs: &[[f64; 2]], of_noise: [f64; 2]) -> [[f64; 2]; 2] {
     let freedom = (runs.len() - 1) as f64;
     let product = |a: usize, b: usize| runs.iter().map(|run| run[a] * run[b]).sum::<f64>() / freedom;
-    let (level, tilt, both) = (product(0, 0), product(1, 1), product(0, 1));
+    let (level, tilt, both) = (product(0, 0) - of_noise[0], product(1, 1) - of_noise[1], product(0, 1));
     let (sin, cos) = (0.5 * (2.0 * both).atan2(level - tilt)).sin_cos();
     [[cos, sin], [-sin, cos]].map(|[along, across]| {
         let variance = level * along * along + 2.0 * both * along * across + tilt * across * across;
