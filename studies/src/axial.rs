@@ -39,7 +39,7 @@ pub enum Layout {
 
 /// Where face motion is looked at: distance from the axis in mm, angle in degrees.
 const TOOL: (f64, f64) = (25.0, 200.0);
-/// The same in symbols.
+/// Name of the face motion at [`TOOL`] in symbols of values.
 const AT_TOOL: &str = "face-at-25mm-200deg";
 
 /// Bound of the form at the pole, peak to valley, in µm.

@@ -110,7 +110,8 @@ pub fn station_holding_out(
     station_with_spread(simulator, rig, station, [samples_per_rev, turns], share, &[])
 }
 
-/// The same, with the spread of the turns where a projection of the setup is there.
+/// Averages the first turns (`[samples_per_rev, turns]`) of any station, a share of them by themselves besides. Where a
+/// projection of a setup is given, the average has the spread of its turns.
 ///
 /// # Errors
 /// When a stage fails.

@@ -113,7 +113,7 @@ fn config(rig: Layout, spectrum: Spectrum, seed: u64) -> SpindleConfig {
     config
 }
 
-/// The same without what differs from turn to turn.
+/// The campaign without what differs from turn to turn, noise and asynchronous motion; 10 turns.
 fn without_noise(mut config: SpindleConfig) -> SpindleConfig {
     config.noise.rms_um = 0.0;
     config.asynchronous.rms_um = None;

@@ -170,7 +170,7 @@ fn label(value: &Value) -> String {
     format!("{} {}", described(&value.id()), unit(&value.unit))
 }
 
-/// The same without the unit; of a domain's own value its symbol.
+/// "RONt LSCI, unfiltered": a value with reference and filter, without its unit; of a domain's own value its symbol.
 pub(super) fn described(id: &ValueId) -> String {
     let (Some(reference), Some(filter)) = (id.reference, id.filter) else { return id.symbol.to_owned() };
     // The mean line is the only one that there is for texture.

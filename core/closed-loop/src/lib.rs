@@ -108,7 +108,7 @@ pub trait Model: Sync {
         Vec::new()
     }
 
-    /// The same model on all data, for the final results: what the loop holds out is part of them.
+    /// The model on all data, for the final results: what the loop holds out is part of them.
     fn whole(&self) -> &Self {
         self
     }

@@ -99,9 +99,9 @@ pub fn unlike(residual: &[f64], basis: &[Vec<f64>]) -> Option<Rows> {
     })
 }
 
-/// The same of readings that repeat places, each with a mean of its own: in a place whose squares are unlike those of the others (Cochran's
-/// test, ISO 5725-2) it is the reading farthest from the others there. Indices count all readings, place by place. `None` where too few are
-/// repeated.
+/// Looks for single readings that are not like the others among readings that repeat places, each place with a mean of its own:
+/// in a place whose squares are unlike those of the others (Cochran's test, ISO 5725-2) it is the reading farthest from the
+/// others there. Indices count all readings, place by place. `None` where too few are repeated.
 #[must_use]
 pub fn unlike_repeats(places: &[Vec<f64>]) -> Option<Rows> {
     let mut first = 0;

@@ -176,7 +176,7 @@ fn values(profile: usize, heights: &[f64]) -> Vec<f64> {
     }
 }
 
-/// The same order as [`NAMES`].
+/// Values of all profiles in the order of [`NAMES`].
 fn in_order(of_profiles: [Vec<f64>; 5]) -> Vec<f64> {
     let [all, of_50, of_15, slopes, slopes_of_15] = of_profiles;
     [&all[..4], &of_50, &of_15, &slopes, &slopes_of_15, &all[4..]].concat()

@@ -11,7 +11,7 @@ use runout_draws::Uncertainty;
 
 /// Share of noise that the largest error of several centres exceeds.
 const BEYOND: f64 = 0.05;
-/// The same share of draws; fewer, as the quantile is known from some hundred of them.
+/// Share of draws that the largest error of several centres exceeds. It is smaller than [`BEYOND`], as the quantile is known from some hundred draws.
 const OF_DRAWS_BEYOND: f64 = 0.025;
 /// From so many times the largest error on, draws give the interval.
 const CLEAR: f64 = 4.0;

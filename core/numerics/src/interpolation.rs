@@ -6,7 +6,7 @@ use crate::Complex64;
 
 /// Values on both sides through which a polynomial goes.
 const THROUGH: usize = 16;
-/// The same as a power.
+/// [`THROUGH`] as an exponent.
 const POWER: i32 = 16;
 /// The polynomial serves where it errs by less than this share of the curve's amplitudes; its second derivative then errs by
 /// some ten times that of theirs.

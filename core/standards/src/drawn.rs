@@ -133,7 +133,7 @@ pub fn in_pairs(
 }
 
 impl Drawn {
-    /// The same where values are taken from what a filter leaves of the form: value number `rms` is its root mean square, and
+    /// The draws where values are taken from what a filter leaves of the form: value number `rms` is its root mean square, and
     /// errors raise its square by their own.
     #[must_use]
     pub fn behind_filter(mut self, rms: usize) -> Self {

@@ -161,7 +161,7 @@ struct Sensor {
     alike: f64,
     /// Observations that all levels together count as.
     observations: f64,
-    /// The same of one capture.
+    /// Observations that the levels of one capture count as.
     of_capture: f64,
 }
 

@@ -45,7 +45,7 @@ pub struct Profile {
     pub course: TurnCourse,
     /// What its marks were put right by, where they do not count the part's turns.
     pub recounted: Option<Recounted>,
-    /// The same turns in parts, where asked for.
+    /// The turns used, in parts, where asked for.
     pub split: Option<Split>,
     /// How far the turns lie apart, where asked for and there are two.
     pub spread: Option<Spread>,
@@ -156,7 +156,7 @@ pub struct Part {
     pub mean: Vec<Complex64>,
     /// Covariance of that mean.
     pub covariance: Option<Vec<Complex64>>,
-    /// The same with independent turns.
+    /// Covariance of that mean if turns were independent.
     pub scatter: Option<Vec<Complex64>>,
     /// What that covariance is taken from; nothing below three turns.
     pub neighbours: Option<Neighbours>,
@@ -260,7 +260,8 @@ pub fn smooth(covariance: &mut [Complex64], size: usize) {
     });
 }
 
-/// The same over [`orders_beside`] to each side: what the variance of a result is taken from.
+/// Replaces the covariance of each order, `[order][entry]` with `size` entries, by the mean over [`orders_beside`] to each side:
+/// what the variance of a result is taken from.
 ///
 /// At low orders the density of asynchronous motion differs from order to order, by slow motion and by single tones:
 /// there an order is looked at by itself.

@@ -152,7 +152,7 @@ pub struct SectionAt {
     pub z_mm: f64,
     /// Where nothing is known of it: a keyway, a stretch without readings. Every value leaves these out.
     pub gaps: Gaps,
-    /// The same as the rig declares them: `gaps` are longer by what marks and edges leave open.
+    /// The gaps as the rig declares them: `gaps` are longer by what marks and edges leave open.
     pub declared_gaps: Gaps,
     /// Share of its readings that the form was computed from.
     pub used: f64,
@@ -232,7 +232,7 @@ impl Separation {
         (0..=self.max_order()).map(|order| student_95(self.degrees_of_freedom(order) as f64) / NORMAL_95).collect()
     }
 
-    /// The same estimates as if the data decided for them, and for each of the equivalents.
+    /// The estimates as if the data decided for them, and those of each equivalent.
     #[must_use]
     pub fn decided(&self) -> (Self, Vec<Self>) {
         let own = Self { equivalents: Vec::new(), ..self.clone() };

@@ -42,7 +42,7 @@ pub struct ChannelsReport {
     pub mark: Option<String>,
     /// A `[load]` table to start from.
     pub load: String,
-    /// The same, part by part.
+    /// The parts of that `[load]` table.
     #[serde(skip)]
     pub suggestion: Suggestion,
     /// What a reader should know of the file.
@@ -81,7 +81,7 @@ pub struct Suggestion {
 }
 
 impl Suggestion {
-    /// The same for a rig's own setups and sensors, in their order; what the rig has no name for is a comment.
+    /// The suggestion with a rig's own setups and sensors, in their order; what the rig has no name for becomes a comment.
     #[must_use]
     pub fn for_rig(mut self, setups: &[&str], sensors: &[&str]) -> Self {
         let mut comments = String::new();

@@ -37,7 +37,8 @@ fn contradicting(mut checks: Vec<Check>) -> Vec<Check> {
     checks
 }
 
-/// The same with the factor on the standard uncertainty of each mean, by which a dependence widens it.
+/// Judges numbers that were taken one after the other, in series of their own, and gives the factor on the standard uncertainty
+/// of each mean, by which a dependence widens it.
 pub(crate) fn means_in_order(what: &str, series: &[(&str, &[f64])], unit: &str) -> Judgement {
     Series::of(series).judged(what, unit, true)
 }

@@ -61,7 +61,7 @@ impl Axis {
         self.measured_beside(chance, targets_mm, runs, |_| 0.0)
     }
 
-    /// The same beside what changes with the number of the approach.
+    /// Measures the axis beside what changes with the number of the approach.
     fn measured_beside(
         &self,
         chance: &mut Chance,

@@ -243,7 +243,7 @@ impl Place {
         (Complex64::cis(self.angle_rad) * self.normal.conj()).re
     }
 
-    /// The same by the cosine or the sine of a component, as the radius of a circle would have them.
+    /// Change of the curve along its normal by the cosine or the sine of a component, as the radius of a circle would have them.
     pub(crate) fn column(&self, component: Component, wave: usize) -> f64 {
         let unit = component.of_radius([[1.0, 0.0], [0.0, 1.0]][wave]);
         (unit * Complex64::cis(f64::from(component.0) * self.angle_rad) * self.normal.conj()).re

@@ -19,7 +19,7 @@ pub struct Campaign {
     pub kind: Kind,
     /// With what is wrong.
     pub config: SpindleConfig,
-    /// The same without it.
+    /// The campaign without what is wrong.
     pub sound: SpindleConfig,
     /// What is wrong, as the loop would say it; of a stranger only its name.
     pub planted: Vec<Planted>,

@@ -92,7 +92,7 @@ impl Fit {
         sums
     }
 
-    /// The same along the columns, of one row.
+    /// Sums along the columns, of one row, of a kernel times what is beside a point.
     fn over_column(&self, values: &[f64], power: usize, row: usize, sums: &mut [f64]) {
         let (reach, kernel) = (self.along.reach, &self.along.powers[power]);
         sums.fill(0.0);

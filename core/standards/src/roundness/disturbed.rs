@@ -150,7 +150,7 @@ impl Disturbed<'_> {
         self.near.suffice(ends_um, moved, largest_um).then_some(values)
     }
 
-    /// The same, sought anew.
+    /// From the contacts of the last draw, by a new search for the circle; `None` where others could touch.
     fn anew(&mut self, largest_um: f64) -> Option<Values> {
         let circle = self.points.reference(self.reference)?;
         let values = self.points.values(&circle);

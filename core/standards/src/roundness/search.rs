@@ -259,7 +259,7 @@ fn slopes<const N: usize>(points: &Points, goal: Goal, place: &[f64; 2], low: f6
     slopes
 }
 
-/// The same of a zone about a place.
+/// Derivatives of the merit of a zone about a place: by the place, and by the upper and lower bound of the heights.
 pub(super) fn zone_slopes(points: &Points, place: &[f64; 2]) -> [f64; 4] {
     let (low, high) = points.cloud.extremes(0..points.len(), place);
     slopes(points, Goal::Zone, place, low, high)

@@ -30,7 +30,7 @@ pub struct Located {
     pub circle: Circle,
     /// Angle of the highest point, in rad from 0 to 2π, and its deviation from the circle, in µm.
     pub peak: [f64; 2],
-    /// The same of the lowest point.
+    /// Angle of the lowest point, in rad from 0 to 2π, and its deviation from the circle, in µm.
     pub valley: [f64; 2],
 }
 

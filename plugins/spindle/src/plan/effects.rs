@@ -81,7 +81,7 @@ pub fn foresee(
     Ok(foresight)
 }
 
-/// The same with all of a rig, the general separator and every effect of this crate.
+/// What the closed loop could find of every effect of this crate with all of a rig and the general separator.
 ///
 /// # Errors
 /// When the model cannot be fitted.

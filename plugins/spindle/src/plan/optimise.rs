@@ -16,7 +16,7 @@ const DRAWS: usize = 60_000;
 const REFINED: usize = 60;
 /// Arrangements near one that are tried before the search for a better one ends.
 const NEIGHBOURS: usize = 2000;
-/// The same where each is tried at many placements within the tolerance.
+/// Arrangements near one that are tried, where each is tried at many placements within the tolerance.
 const NEIGHBOURS_WITHIN_TOLERANCE: usize = 300;
 /// Longest step of the refinement: 5°.
 const LONGEST_STEP: f64 = 500.0;
@@ -143,7 +143,7 @@ struct Bench<'a> {
     gain: FormGain,
     /// What is added to the sensors' angles, in rad, the nominal placement (nothing) among them.
     corners: Vec<Vec<f64>>,
-    /// The same inside the tolerance, where a high order may be worse than at any corner.
+    /// Angles inside the tolerance that are added to the sensors' angles, in rad: a high order may be worse there than at any corner.
     inside: Vec<Vec<f64>>,
 }
 

@@ -55,7 +55,7 @@ struct Carried<'a> {
     lost: Vec<bool>,
     /// Mean square of the readings, `[order][section]`: of form and motion together.
     squares: Vec<Vec<f64>>,
-    /// The same of axial readings: of a face's form and motion along the axis together.
+    /// Mean square of the axial readings, `[order][section]`: of a face's form and motion along the axis together.
     face_squares: Vec<Vec<f64>>,
     /// Mean square over all sections.
     mean: Vec<f64>,

@@ -55,7 +55,7 @@ pub(crate) struct SecondOrder<'a> {
     turned: Vec<Complex64>,
     /// Part angles where lines meet the profile, rad, `[reading][angle]`.
     met_rad: Vec<f64>,
-    /// The same of one reading at all samples.
+    /// Part angles where the line of one reading meets the profile, rad, at all samples.
     met_at: Vec<f64>,
 }
 

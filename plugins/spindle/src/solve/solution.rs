@@ -176,7 +176,7 @@ impl Solver<'_> {
         self.second_order && share * readings.max_order as f64 > COUPLED
     }
 
-    /// The same, of all orders together.
+    /// Solves all orders together, pass by pass, until the solution settles. Gives the solution and the linear readings, `[order][reading]`.
     fn together(
         &self,
         readings: &Readings,
