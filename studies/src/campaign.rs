@@ -70,7 +70,7 @@ pub fn reference(seed: u64, eccentricity_um: f64) -> SpindleConfig {
     config
 }
 
-/// For stages that look at nothing but their own keys.
+/// For stages that use nothing but their own keys.
 fn no_context() -> Context<'static> {
     Context { folder: Path::new(""), rig: None }
 }

@@ -135,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn evidence_counts_against_what_is_left() {
+    fn evidence_counts_against_the_residual() {
         let clean = Evidence::new(1040.0, 1000.0, 1, 1000, 50, true);
         assert!(clean.delta_bic < -10.0 && clean.p_value < 1e-6);
         // The same gain beside ten times the misfit says little.

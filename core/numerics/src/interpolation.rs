@@ -87,7 +87,7 @@ impl<'a> Curve<'a> {
         let mut wave = Complex64::ONE;
         let mut sums = [0.0; 3];
         for (order, harmonic) in self.series.iter().enumerate() {
-            // Rounding of the product's powers is taken back now and then.
+            // Rounding of the product's powers is corrected now and then.
             if order % 64 == 0 {
                 wave = Complex64::cis(order as f64 * angle);
             }

@@ -101,7 +101,7 @@ pub struct Drawn {
     share: f64,
 }
 
-/// Draws `pairs` errors (`next` fills as many as the form has points) and looks at the form with and without each of them
+/// Draws `pairs` errors (`next` fills as many as the form has points) and evaluates the form with and without each of them
 /// added; `look` gives the same values of both of two forms.
 pub fn in_pairs(
     form_um: &[f64],

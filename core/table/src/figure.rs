@@ -28,7 +28,7 @@ pub struct Figure {
     /// Places along the horizontal axis that all panels name.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub named: Vec<(f64, String)>,
-    /// Name of a table of [reference circles](crate::circles) about which the curves of a polar figure can be looked at; its rows have the
+    /// Name of a table of [reference circles](crate::circles) about which the curves of a polar figure can be drawn; its rows have the
     /// same columns of names.
     #[serde(default)]
     pub circles: Option<String>,

@@ -109,8 +109,8 @@ pub struct Separation {
     /// Covariance E[δ δᴴ] of the forms among `unknowns`, `[order][form][form]` from order 0: sections of a station
     /// share the errors of its motion. What is not observable means nothing. `None` where it is not known.
     pub form_covariance: Option<Vec<Complex64>>,
-    /// Real degrees of freedom behind `variance` at an order that was looked at by itself, or of the readings that all orders have it from; 0 where it
-    /// is taken as exact. [`degrees_of_freedom`](Self::degrees_of_freedom) gives those of any order.
+    /// Real degrees of freedom behind `variance` at an order that was evaluated by itself, or of the readings that all orders have it from; 0 where
+    /// it is taken as exact. [`degrees_of_freedom`](Self::degrees_of_freedom) gives those of any order.
     pub freedom: usize,
     /// Which orders share them.
     pub variance_from: VarianceFrom,

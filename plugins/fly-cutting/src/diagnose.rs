@@ -18,9 +18,9 @@ use crate::{
     strangers::{self, Stranger},
 };
 
-/// How often strangers are looked for, taken out, and the loop run again.
+/// How often unmodelled disturbances are looked for, taken out, and the loop run again.
 const ROUNDS: usize = 3;
-/// Strangers that are listed.
+/// Unmodelled disturbances that are listed.
 const LISTED: usize = 5;
 /// Key values before and after.
 const LOOKED_AT: [&str; 3] = ["Sq", "Sz", "Sa"];

@@ -26,7 +26,7 @@ const TOO_SMOOTH: f64 = 0.3;
 /// χ² per degree of freedom from which more is left than noise.
 const MORE_THAN_NOISE: f64 = 1.5;
 
-/// The ideal surface of a cut, what is left of it, and a model for the closed loop.
+/// The ideal surface of a cut, its residual, and a model for the closed loop.
 #[derive(Debug, Clone)]
 pub struct FlyCutting(pub(crate) FlyCuttingConfig);
 

@@ -11,7 +11,7 @@ use runout_core::{
 
 use crate::runs::{Approaches, mean};
 
-/// Series that are looked at, evenly taken of more.
+/// Series that are evaluated, evenly taken of more.
 const MOST_SERIES: usize = 20;
 /// Parts of the travel whose scatter is compared.
 const PARTS: usize = 3;

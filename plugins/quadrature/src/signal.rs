@@ -110,7 +110,7 @@ impl Signal {
             let waves = of.iter().flat_map(|component| [0, 1].map(|wave| (*component, wave)));
             waves.map(|(component, wave)| places.iter().map(|place| place.column(component, wave)).collect()).collect()
         };
-        // What is left of the distances beside components of the first order.
+        // The residual of the distances beside components of the first order.
         let left = |signal: &Self| {
             let places = signal.places(phase_rad, radius);
             let mut left: Vec<f64> = places.iter().map(|place| place.distance).collect();

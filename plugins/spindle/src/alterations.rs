@@ -244,7 +244,7 @@ impl Alterations {
         self.places[swapped]
     }
 
-    /// Whether all values are such that readings can be taken back to displacements.
+    /// Whether all values are such that readings can be converted to displacements.
     #[must_use]
     pub fn are_possible(&self) -> bool {
         let sensor = |sensor: &SensorAlteration| {
@@ -271,7 +271,7 @@ impl Alterations {
 }
 
 impl SetupAlteration {
-    /// The angle at which the recording believes to be when the spindle is at this one: φ + ε(φ) = Φ, with ε 0 at the marks.
+    /// The angle that the recording assumes when the spindle is at this one: φ + ε(φ) = Φ, with ε 0 at the marks.
     pub(crate) fn recorded_at(&self, angle_rad: f64) -> f64 {
         let early = |angle: f64| self.ripples.iter().map(|ripple| ripple.at(angle) - ripple.cosine).sum::<f64>();
         let mut recorded = angle_rad;

@@ -64,7 +64,7 @@ pub struct Plugin<S> {
 /// From a stage's table to the stage.
 type Build<S> = Box<dyn Fn(&Table, &Context) -> Result<S, Fault> + Send + Sync>;
 
-/// What a stage's check may look at besides its own keys.
+/// What a stage's check may use besides its own keys.
 #[derive(Debug, Clone, Copy)]
 pub struct Context<'a> {
     /// The folder that relative paths start from.

@@ -1,4 +1,4 @@
-//! Points of a wall in separate columns, so that a look at all of them goes through vector registers.
+//! Points of a wall in separate columns, so that all of them are evaluated in vector registers.
 
 #![allow(clippy::inline_always, reason = "see runout_numerics::lanes")]
 

@@ -246,7 +246,7 @@ fn several<A: Arithmetic, const C: usize>(
     let fraction = |index: usize| positions[index] - below - index as f64;
     let place = kernel.place(fraction(TOGETHER / 2).clamp(0.0, 1.0));
     let across: [f64; TOGETHER] = std::array::from_fn(|index| place.across(fraction(index)));
-    // No `all`: it would look at one after the other.
+    // No `all`: it would examine one after the other.
     if !across.iter().fold(true, |near, across| near & (across.abs() <= SERVES)) {
         return None;
     }

@@ -1,7 +1,7 @@
 //! Changes within a setup: a probe that slips shows in the turns, from one of them on, and in no other sensor.
 //!
 //! The average of such a reading is that of no one state. Its change, as large as it is, goes into its uncertainty, so that
-//! no effect has to take the blame.
+//! it is attributed to no effect.
 
 use runout_core::{
     Complex64,

@@ -27,7 +27,7 @@ pub(super) struct Solved {
     /// Nothing where there is none, and of a part of the turns.
     pub stated: Option<Propagation>,
     pub estimate: Estimate,
-    /// Readings taken back to displacements, without their covariance.
+    /// Readings converted to displacements, without their covariance.
     pub corrected: Readings,
     /// The corrected readings without what exact geometry adds.
     pub linear: Vec<Complex64>,
@@ -39,7 +39,7 @@ pub(super) struct Solved {
     pub floor_std: Vec<f64>,
     /// Mean slope of the characteristics, `[reading]`.
     pub slopes: Vec<f64>,
-    /// What is left of the readings, as a run states it.
+    /// The residual of the readings, as a run states it.
     pub residual: Residual,
 }
 

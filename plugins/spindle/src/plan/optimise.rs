@@ -22,7 +22,7 @@ const NEIGHBOURS_WITHIN_TOLERANCE: usize = 300;
 const LONGEST_STEP: f64 = 500.0;
 /// With more sensors than this, corners of the tolerance are drawn instead of all being tried.
 const ALL_CORNERS: usize = 6;
-/// Placements inside the tolerance that a result is looked at besides.
+/// Placements inside the tolerance at which a result is evaluated besides.
 const INSIDE: usize = 500;
 /// Two arrangements are different when some distance between two sensors differs by this much, in degrees.
 const DIFFERENT_DEG: f64 = 2.0;
@@ -135,7 +135,7 @@ pub fn optimise(rig: &Rig, search: &Search, progress: &mut dyn FnMut(&str)) -> R
 }
 
 /// What arrangements are tried on. An arrangement is the sensors' angles in hundredths of a degree; the first's is not
-/// looked at.
+/// used.
 struct Bench<'a> {
     rig: &'a Rig,
     search: &'a Search,

@@ -1,4 +1,4 @@
-//! The part: one function h(α, z), so that whatever looks at the same z sees the same circle.
+//! The part: one function h(α, z), so that all sensors at the same z see the same circle.
 
 use std::f64::consts::TAU;
 

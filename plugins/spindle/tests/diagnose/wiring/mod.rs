@@ -309,7 +309,7 @@ fn sensors_turned_wrongly_in_a_setup_are_named() {
     }
 }
 
-/// Large effects and strangers are no mistakes in the rig file.
+/// Large effects and unmodelled disturbances are no mistakes in the rig file.
 #[test]
 fn nothing_else_is_taken_for_a_mistake() {
     for (index, effect) in [
