@@ -100,7 +100,7 @@ pub(crate) fn hidden_noise(scan: &Scan, basis: &Basis) -> Option<String> {
         return None;
     }
     hidden(format!(
-        "what is left at orders {from} to {middle} has {} times the size of that at {middle} to {to}, where noise has the same",
+        "the residual at orders {from} to {middle} has {} times the size of that at {middle} to {to}, where noise has the same",
         significant((lower / upper).sqrt(), 2)
     ))
 }

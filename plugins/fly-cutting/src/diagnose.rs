@@ -86,8 +86,8 @@ impl FlyCutting {
             diagnosis.warnings.push(format!(
                 "{}: {left_out} points are left out of the fit, and are part of all values",
                 match strangers.len() {
-                    1 => "what is left in one place is no effect of the cut".to_owned(),
-                    count => format!("what is left in {count} places is no effect of the cut"),
+                    1 => "the residual in one place is no effect of the cut".to_owned(),
+                    count => format!("the residual in {count} places is no effect of the cut"),
                 }
             ));
         }

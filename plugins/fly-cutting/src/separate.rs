@@ -159,7 +159,7 @@ impl FlyCutting {
         let phase_um = last.phase_um().map(|[phase, std]| [phase, if settings.is_empty() { std } else { f64::NAN }]);
         if phase_um.is_none() {
             remarks
-                .push("the scallops do not show above what is left: their phase is not observable and set to 0".into());
+                .push("the scallops do not show above the residual: their phase is not observable and set to 0".into());
         }
         let known = Known {
             config: &self.0,
