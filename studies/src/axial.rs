@@ -1,4 +1,4 @@
-//! How often the stated 95 % intervals of axial error motion hold the truth, over simulated spindles.
+//! How often the stated 95 % intervals of axial error motion cover the true value, over simulated spindles.
 
 use std::f64::consts::TAU;
 
@@ -23,7 +23,7 @@ use crate::{campaign, coverage::Row};
 
 /// Half width of the 95 % interval of a normal distribution, in standard deviations.
 const NORMAL_95: f64 = 1.96;
-/// Angles at which z is looked at.
+/// Angles at which z is evaluated.
 const ANGLES: usize = 36;
 /// Setups that are separated; one more is recorded for what another capture would show.
 const SETUPS: usize = 3;
@@ -37,9 +37,9 @@ pub enum Layout {
     Face,
 }
 
-/// Where face motion is looked at: distance from the axis in mm, angle in degrees.
+/// Where face motion is evaluated: distance from the axis in mm, angle in degrees.
 const TOOL: (f64, f64) = (25.0, 200.0);
-/// The same in symbols.
+/// Name of the face motion at [`TOOL`] in symbols of values.
 const AT_TOOL: &str = "face-at-25mm-200deg";
 
 /// Bound of the form at the pole, peak to valley, in µm.

@@ -70,7 +70,7 @@ pub fn reference(seed: u64, eccentricity_um: f64) -> SpindleConfig {
     config
 }
 
-/// For stages that look at nothing but their own keys.
+/// For stages that use nothing but their own keys.
 fn no_context() -> Context<'static> {
     Context { folder: Path::new(""), rig: None }
 }
@@ -110,7 +110,8 @@ pub fn station_holding_out(
     station_with_spread(simulator, rig, station, [samples_per_rev, turns], share, &[])
 }
 
-/// The same, with the spread of the turns where a projection of the setup is there.
+/// Averages the first turns (`[samples_per_rev, turns]`) of any station, a share of them by themselves besides. Where a
+/// projection of a setup is given, the average has the spread of its turns.
 ///
 /// # Errors
 /// When a stage fails.

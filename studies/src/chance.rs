@@ -43,7 +43,7 @@ impl Chance {
         self.between(low.ln(), high.ln()).exp()
     }
 
-    /// The same with either sign; of pairs (`large`) only the upper half of the decades.
+    /// A size of either sign, every decade as likely; of pairs (`large`) only the upper half of the decades.
     pub fn signed(&mut self, low: f64, high: f64, large: bool) -> f64 {
         let low = if large { (low * high).sqrt() } else { low };
         let size = self.size(low, high);

@@ -1,4 +1,4 @@
-//! How often the stated 95 % intervals hold the truth, over simulated campaigns with asynchronous motion.
+//! How often the stated 95 % intervals cover the true value, over simulated campaigns with asynchronous motion.
 
 use std::fmt::Write;
 
@@ -20,15 +20,15 @@ use crate::campaign;
 
 /// Half width of the 95 % interval of a normal distribution, in standard deviations.
 const NORMAL_95: f64 = 1.96;
-/// Angles at which form and motion are looked at.
+/// Angles at which form and motion are evaluated.
 const ANGLES: usize = 72;
 
-/// Intervals of one kind that were looked at.
+/// Intervals of one kind that were evaluated.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Row {
-    /// Which quantity, and how it is looked at.
+    /// Which quantity, and how it is evaluated.
     pub name: String,
-    /// Intervals that hold the truth.
+    /// Intervals that cover the true value.
     pub inside: usize,
     /// All intervals.
     pub all: usize,
@@ -54,7 +54,7 @@ impl Row {
         self.stated += std * std;
     }
 
-    /// Share of the intervals that hold the truth, in percent.
+    /// Share of the intervals that cover the true value, in percent.
     #[must_use]
     pub fn percent(&self) -> f64 {
         100.0 * self.inside as f64 / self.all.max(1) as f64

@@ -16,7 +16,7 @@ use runout_spindle::{
 
 use crate::campaign::{self, reference};
 
-/// Orders that the score looks at.
+/// Orders that the score uses.
 const ORDERS: std::ops::RangeInclusive<usize> = 2..=100;
 
 /// All campaigns on so many threads.

@@ -1,5 +1,5 @@
-//! How often the stated 95 % intervals of the standards' values hold the truth: whole pipelines, from recording to values.
-//! The truth of a value is that of the same campaign without noise and asynchronous motion, by the same evaluation.
+//! How often the stated 95 % intervals of the standards' values cover the true value: whole pipelines, from recording to values.
+//! The true value is that of the same campaign without noise and asynchronous motion, by the same evaluation.
 
 use std::{
     collections::BTreeMap,
@@ -57,7 +57,7 @@ pub const RIGS: [Layout; 2] = [Layout::Four, Layout::Six];
 /// What was counted of one value.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Row {
-    /// Intervals that hold the truth.
+    /// Intervals that cover the true value.
     pub inside: usize,
     /// Intervals with the truth below and above.
     pub beside: [usize; 2],
@@ -72,7 +72,7 @@ impl Row {
         self.inside + self.beside[0] + self.beside[1]
     }
 
-    /// Share that holds the truth, in percent.
+    /// Share that covers the true value, in percent.
     #[must_use]
     pub fn percent(&self) -> f64 {
         100.0 * self.inside as f64 / self.intervals().max(1) as f64
@@ -113,7 +113,7 @@ fn config(rig: Layout, spectrum: Spectrum, seed: u64) -> SpindleConfig {
     config
 }
 
-/// The same without what differs from turn to turn.
+/// The campaign without what differs from turn to turn, noise and asynchronous motion; 10 turns.
 fn without_noise(mut config: SpindleConfig) -> SpindleConfig {
     config.noise.rms_um = 0.0;
     config.asynchronous.rms_um = None;

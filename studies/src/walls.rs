@@ -1,5 +1,5 @@
-//! How often stated intervals hold the truth on walls whose centres are known, as a measuring machine gives them: positions about a
-//! datum, taper and lines, and texture along the axis. Whole pipelines, from points to values; the truth is that of the same wall
+//! How often stated intervals cover the true value on walls whose centres are known, as a measuring machine gives them: positions about a
+//! datum, taper and lines, and texture along the axis. Whole pipelines, from points to values; the true value is that of the same wall
 //! without noise.
 
 use std::{f64::consts::TAU, fmt::Write, ops::Range, path::Path};

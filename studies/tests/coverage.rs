@@ -3,7 +3,7 @@
 use runout_studies::coverage::{Setting, rows, table};
 
 #[test]
-fn stated_intervals_hold_the_truth() {
+fn stated_intervals_cover_the_true_value() {
     let rows = rows(&Setting::Reference.campaigns(0, 40)).unwrap();
     println!("{}", table(&rows));
     let linear = rows.iter().filter(|row| !["RONt", "Ra"].contains(&&*row.name));

@@ -5,7 +5,7 @@
 use runout_studies::spatial;
 
 #[test]
-fn predictions_hold_the_truth_and_compensation_takes_it_away() {
+fn predictions_cover_the_true_error_and_compensation_removes_it() {
     let found = spatial::coverage(6, 5, None).unwrap();
     println!("{}", spatial::table(std::slice::from_ref(&found)));
     assert!((0.6..1.6).contains(&found.chi2()) && found.share_inside() > 0.88, "{found:?}");

@@ -5,7 +5,7 @@ use runout_studies::values::{RIGS, Spectrum, rows, table};
 use crate::trials::trials;
 
 #[test]
-fn intervals_of_values_hold_the_truth() {
+fn intervals_of_values_cover_the_true_value() {
     let folder = tempfile::tempdir().unwrap();
     let campaigns = trials(10);
     let rows = rows(RIGS[0], Spectrum::Falling, 0..campaigns as u64, folder.path()).unwrap();

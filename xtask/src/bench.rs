@@ -77,7 +77,7 @@ pub(crate) fn campaign(words: &[&str]) -> Outcome {
     time_campaign(&Options::read(words)?).map(|_| ())
 }
 
-/// The same with both kinds of samples; the table goes where `benchmarks/README.md` shows it.
+/// Times both programs with both kinds of samples; the table goes where `benchmarks/README.md` shows it.
 pub(crate) fn all_peers(words: &[&str]) -> Outcome {
     let options = Options { i16: true, ..Options::read(words)? };
     if !time_campaign(&options)? {

@@ -21,7 +21,7 @@ const ROUNDS: usize = 7;
 /// Stations of the large report.
 const MANY: usize = 400;
 
-/// Runs all examples with a report each, looks at every page, and prints a table of size and time.
+/// Runs all examples with a report each, examines every page, and prints a table of size and time.
 pub(crate) fn check(words: &[&str]) -> Outcome {
     let program = match words {
         [] => {

@@ -56,7 +56,7 @@ pub(crate) fn execute(args: &CompareArgs, json: bool, registry: &Registry) -> st
     fail_on(comparison.warnings.len(), args.warnings)
 }
 
-/// The same of measured points, which are in memory as a whole.
+/// Compares methods on measured points, which are in memory as a whole.
 fn points(
     args: &CompareArgs,
     json: bool,

@@ -47,7 +47,7 @@ pub(crate) fn execute(args: &PlanArgs, json: bool, registry: &Registry) -> Resul
     }
 }
 
-/// The same as a document.
+/// Plans a rig, or the layout of a pipeline of measured points, and returns the report as a JSON document.
 ///
 /// # Errors
 /// As [`execute`].

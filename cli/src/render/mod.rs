@@ -31,7 +31,7 @@ fn is_harmful(character: char) -> bool {
     breaks_line(character) && !matches!(character, '\n' | '\t')
 }
 
-/// The same, and what ends a line.
+/// Whether a character is a control character, a line break among them, or a mark that turns the direction of text.
 fn breaks_line(character: char) -> bool {
     character.is_control()
         || matches!(character, '\u{2028}' | '\u{2029}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')

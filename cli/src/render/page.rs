@@ -190,7 +190,7 @@ impl Page {
         text
     }
 
-    /// The same for a report. The first line is its title, those before the first heading are its headline.
+    /// The page as title and overview of a report. The first line is its title, those before the first heading are its headline.
     #[must_use]
     pub(crate) fn into_overview(self, rig: Option<Rig>) -> (String, Overview) {
         let mut lead = Vec::new();

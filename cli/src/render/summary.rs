@@ -170,7 +170,7 @@ fn label(value: &Value) -> String {
     format!("{} {}", described(&value.id()), unit(&value.unit))
 }
 
-/// The same without the unit; of a domain's own value its symbol.
+/// "RONt LSCI, unfiltered": a value with reference and filter, without its unit; of a domain's own value its symbol.
 pub(super) fn described(id: &ValueId) -> String {
     let (Some(reference), Some(filter)) = (id.reference, id.filter) else { return id.symbol.to_owned() };
     // The mean line is the only one that there is for texture.
@@ -191,7 +191,7 @@ fn std_of(value: &Value) -> Option<f64> {
     value.uncertainty.as_ref().map(|uncertainty| uncertainty.std)
 }
 
-/// A value with its standard uncertainty, or with its 95 % interval where this does not hold the value: noise adds to ranges.
+/// A value with its standard uncertainty, or with its 95 % interval where this does not cover the value: noise adds to ranges.
 fn with_uncertainty(value: &Value) -> String {
     let mark = mark(value.refuted_by.as_ref());
     let Some(known) = &value.uncertainty else { return significant(value.value, 4) + mark };

@@ -151,7 +151,7 @@ impl Table {
         (0..self.rows.first().map_or(0, Vec::len)).filter(used).collect()
     }
 
-    /// The same for a report.
+    /// The table as a part of a report, without columns that are empty in every row.
     #[must_use]
     pub(crate) fn into_part(self) -> Part {
         let columns = self.used();

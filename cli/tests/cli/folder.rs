@@ -78,7 +78,7 @@ impl Folder {
         self.run_by(cargo_bin_cmd!("runout").env_remove("COLUMNS"), arguments)
     }
 
-    /// The same where lines have so many columns.
+    /// Runs the program here with lines of so many columns.
     pub(crate) fn run_within(&self, columns: usize, arguments: &[&str]) -> Ran {
         self.run_by(cargo_bin_cmd!("runout").env("COLUMNS", columns.to_string()), arguments)
     }

@@ -57,7 +57,7 @@ fn separators_of_points_are_compared() {
             assert!((one["std_ratio"].as_f64().unwrap() - std / own_std).abs() < 1e-9);
         }
     }
-    // Only the weighted fit says what is left after compensation.
+    // Only the weighted fit gives the residual after compensation.
     assert!(named(&found["values"], "symbol", "dx_range_after")["differences"].as_array().unwrap().is_empty());
     let column = named(&found["columns"], "column", "ecc_urad");
     assert_eq!((&column["table"], &column["differences"][0]["rows"]), (&"component_errors".into(), &36.into()));

@@ -197,7 +197,7 @@ fn equal_runs_give_equal_files() {
 }
 
 /// After a kill at any step, the next run succeeds and leaves nothing else; until it, what is there is old or new as a whole, or a journal
-/// says that it is neither. A step that fails takes back those before it.
+/// says that it is neither. A step that fails undoes those before it.
 #[test]
 #[cfg(target_os = "linux")]
 fn a_kill_at_any_step_leaves_old_or_new_results() {
@@ -228,7 +228,7 @@ fn a_kill_at_any_step_leaves_old_or_new_results() {
     assert!(new.len() > 4 && new.keys().eq(old.keys()));
     for kind in ["kill", "fail"] {
         let mut interrupted = 0;
-        // Kills at every step; failures, which take back what was renamed, at some.
+        // Kills at every step; failures, which undo renames, at some.
         for step in (1..).step_by(if kind == "kill" { 1 } else { 3 }) {
             assert!(step < 200, "the steps do not end");
             let code = run("new", Some(format!("{kind}:{step}")));

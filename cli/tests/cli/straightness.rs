@@ -79,7 +79,7 @@ fn from_traces_to_tables() {
     assert!(!shown.stdout.contains("station") && !shown.stdout.contains("Residual"), "{}", shown.stdout);
 }
 
-/// The same with three traces a setup and noise of some 0.007 µm.
+/// Readings of a reversal: two setups, three traces a setup, noise of some 0.007 µm.
 fn repeated_traces() -> String {
     let mut text = String::from("trace;setup;z_mm;reading_um\n");
     for (setup, sign) in [("initial", 1.0), ("reversed", -1.0)] {

@@ -13,7 +13,7 @@ const ROUNDS: usize = 3;
 
 impl<M: Model> Tracing<'_, M> {
     /// The best refit over all combinations of members, of which `current` is the first, and the others that are at most so
-    /// much worse in χ², in units of what is left. Members that are in none of these leave their sets; those of the best
+    /// much worse in χ², in units of the residual. Members that are in none of these leave their sets; those of the best
     /// combination come first.
     pub(super) fn combinations(
         &mut self,

@@ -215,7 +215,7 @@ impl Added {
         std::iter::once(&first).chain(&self.confounded_with).cloned().collect::<Vec<_>>().join(" or ")
     }
 
-    /// The same in a sentence: of many, the first ones.
+    /// All that it may be, in a sentence: of many members, the first ones.
     fn some_members(&self) -> String {
         let others = self.confounded_with.len();
         if others <= MOST_MEMBERS {

@@ -32,8 +32,8 @@ impl Evidence {
         Self::in_units_of(unit, before - after, parameters, [(dof + parameters) as f64, dof as f64], candidates)
     }
 
-    /// The same of an effect that data show which nothing else bears on, and whose noise is known ([`Model::is_seen_besides`]): what the
-    /// larger model leaves of all other data says nothing of it.
+    /// Evidence for an effect that data show which nothing else bears on, and whose noise is known ([`Model::is_seen_besides`]).
+    /// The residual of all other data does not count.
     ///
     /// [`Model::is_seen_besides`]: crate::Model::is_seen_besides
     #[must_use]
@@ -135,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn evidence_counts_against_what_is_left() {
+    fn evidence_counts_against_the_residual() {
         let clean = Evidence::new(1040.0, 1000.0, 1, 1000, 50, true);
         assert!(clean.delta_bic < -10.0 && clean.p_value < 1e-6);
         // The same gain beside ten times the misfit says little.

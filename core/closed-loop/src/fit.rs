@@ -30,7 +30,7 @@ pub struct Refit<F> {
 }
 
 impl<F: Fit> Refit<F> {
-    /// The same with what the fit leaves in place of the fit.
+    /// The refit with what the fit leaves in place of the fit.
     pub(super) fn remainder_only(self) -> Refit<Remainder> {
         let Self { settings, fit, chi2, covariance, ends_at_bound } = self;
         Refit { settings, fit: fit.remainder().clone(), chi2, covariance, ends_at_bound }

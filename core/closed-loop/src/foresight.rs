@@ -136,7 +136,7 @@ pub fn foresee<M: Model>(model: &M) -> Result<Foresight> {
 }
 
 impl Foresight {
-    /// The same effect at several orders is one, visible from where all of them are.
+    /// Adds an effect. At several orders it is one effect, visible from where all of them are.
     fn see(&mut self, effect: &Effect, parameters: Vec<VisibleFrom>) {
         let known = self.visible.iter_mut().find(|known| known.effect == effect.id && known.targets == effect.targets);
         let Some(known) = known else {

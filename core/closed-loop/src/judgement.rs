@@ -1,4 +1,4 @@
-//! Whether what was found is believed: measures of a remainder and of what an effect takes away.
+//! Whether what was found is accepted: measures of a remainder and of what an effect takes away.
 
 use super::{
     Effect, Fit, Model, Remainder,
@@ -11,16 +11,16 @@ use super::{
 use runout_consistency::{Check, Test};
 use runout_numerics::least_squares::{dot, norm, orthonormal};
 
-/// Chance of noise doing as much, corrected for the number of candidates, below which an effect is believed.
+/// Chance of noise doing as much, corrected for the number of candidates, below which an effect is accepted.
 pub(super) const P_LIMIT: f64 = 1e-3;
 /// "Very strong" evidence (Kass, Raftery, J. Am. Stat. Assoc. 90 (1995) 773).
 pub(super) const BIC_LIMIT: f64 = -10.0;
 /// χ² per degree of freedom up to which noise is all that is left: covariances are estimates themselves.
 const FLOOR_CHI2: f64 = 1.5;
-/// Where something stays unexplained, an effect is believed only if it takes away this share of what was: a stranger lets
-/// the least bad effect take a part.
+/// Where something stays unexplained, an effect is accepted only if it removes this share of the excess: the least bad effect explains
+/// a part of an unmodelled disturbance.
 const OWN_SHARE: f64 = 0.8;
-/// An effect that is this many times its tolerance is unusual. No size is refused; but where something stays unexplained, what is left,
+/// An effect that is this many times its tolerance is unusual. No size is refused; but where something stays unexplained, the residual,
 /// as a size of the same effect, must not be larger than it may be beside an effect of this size.
 const UNUSUAL: f64 = 100.0;
 /// Held-out data must improve by more than this share of their squares (half of it in rms), so that rounding is no improvement.
@@ -82,7 +82,7 @@ pub(super) fn same_finding<M: Model>(model: &M, one: usize, other: usize) -> boo
     one.id == other.id && one.targets.len() == 2 && other.targets.len() == 2 && in_any_order
 }
 
-/// χ² per degree of freedom above what noise leaves, up to which an effect is believed though something stays unexplained.
+/// χ² per degree of freedom above what noise leaves, up to which an effect is accepted though something stays unexplained.
 pub(super) fn may_leave<M: Model>(model: &M, found: &FoundEffect) -> f64 {
     let unusual = model.size(found.members[0], &found.values).max(UNUSUAL) / UNUSUAL;
     (1.0 - OWN_SHARE) / (unusual * unusual) * excess(&found.before)
@@ -114,7 +114,7 @@ pub(super) fn above_chance(remainder: &Remainder) -> bool {
     remainder.noise_is_known() && remainder.chi2_per_dof() > chance(remainder)
 }
 
-/// Why an effect explains too little to be believed, by what is left without and with it.
+/// Why an effect explains too little to be accepted, by the residual without and with it.
 pub(super) fn too_little([before, after]: [&Remainder; 2], evidence: &Evidence) -> Option<String> {
     let lowered = before.chi2() - after.chi2();
     if evidence.p_value > P_LIMIT || evidence.delta_bic > BIC_LIMIT {

@@ -12,7 +12,7 @@ use runout_numerics::least_squares::{dot, orthonormal};
 /// Share of an effect's squares from which the readings of the tests show it.
 const SHOWN: f64 = 0.1;
 
-/// What is fitted and what is left, on the readings that the structure is of.
+/// What is fitted and the residual, on the readings that the structure is of.
 pub(super) struct Keyed<'a, F> {
     fit: &'a F,
     /// The effects found already, in the residual's own coordinates.

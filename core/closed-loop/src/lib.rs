@@ -1,7 +1,7 @@
 //! The closed loop: what a declared model leaves of the data, traced to what it lacks.
 //!
-//! A [`Model`] fits everything that it declares and says what is left; it knows *effects* that it could have besides, each
-//! with parameters and a signature, the derivative of what is left by each parameter. [`diagnose`] finds which
+//! A [`Model`] fits everything that it declares and gives the residual; it knows *effects* that it could have besides, each
+//! with parameters and a signature, the derivative of the residual by each parameter. [`diagnose`] finds which
 //! of them the data ask for, adds them, and says what it cannot know. Nothing here knows what is measured.
 //!
 //! ```
@@ -108,7 +108,7 @@ pub trait Model: Sync {
         Vec::new()
     }
 
-    /// The same model on all data, for the final results: what the loop holds out is part of them.
+    /// The model on all data, for the final results: what the loop holds out is part of them.
     fn whole(&self) -> &Self {
         self
     }
@@ -139,7 +139,7 @@ pub trait Model: Sync {
         false
     }
 
-    /// Mistakes in the declaration that may explain what is left with some effects applied, the likeliest first: each entry is
+    /// Mistakes in the declaration that may explain the residual with some effects applied, the likeliest first: each entry is
     /// one mistake, or several that were made together. Asked for only where far more than noise is left.
     fn suspected_mistakes(&self, _applied: &[Setting]) -> Vec<Vec<usize>> {
         Vec::new()
@@ -158,10 +158,10 @@ pub trait Model: Sync {
 
 /// A model fitted to its data.
 pub trait Fit: Sync {
-    /// What is left.
+    /// The residual, and what is known of it.
     fn remainder(&self) -> &Remainder;
 
-    /// How what is left changes with each parameter of an effect (an index into [`Model::effects`]), at the values that are
+    /// How the residual changes with each parameter of an effect (an index into [`Model::effects`]), at the values that are
     /// applied, or at none: `[parameter][residual]`, per unit of the parameter. Everything that the model fits anyway is
     /// already taken out of it.
     fn signature(&self, effect: usize) -> Vec<Vec<f64>>;
@@ -222,7 +222,7 @@ pub trait Fit: Sync {
     {
     }
 
-    /// Values that people look at, with their standard uncertainty where it is known.
+    /// Values that users read, with their standard uncertainty where it is known.
     fn values(&self) -> Vec<LookedAt>;
 
     /// Takes into its results' uncertainty what is not known of the parameters of these effects, one after the other:
@@ -298,7 +298,7 @@ pub struct Remainder {
     pub structure: Arc<Structure>,
     /// Its degrees of freedom.
     pub dof: usize,
-    /// Root mean square of what is left, in the data's unit.
+    /// Root mean square of the residual, in the data's unit.
     pub rms: f64,
     /// Its value expected from noise, in the data's unit; NaN where the noise is not known from elsewhere: then
     /// `residual` is in the data's unit.
@@ -355,7 +355,7 @@ pub struct Bias {
     pub unit: String,
 }
 
-/// A value that people look at.
+/// A value that users read.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LookedAt {
     /// Its symbol or name.

@@ -15,11 +15,12 @@ const SUSPICIOUS_CHI2: f64 = 10.0;
 /// A mistake leaves less than this share of χ² per degree of freedom when it is corrected: the wrong correction of a sound
 /// declaration makes it larger.
 const LEFT: f64 = 0.1;
-/// The same where the noise is not known, and nothing says how much may be left.
+/// Where the noise is not known, a corrected mistake leaves less than this share of χ² per degree of freedom: nothing says how
+/// large the residual may be.
 const LEFT_OF_UNKNOWN: f64 = 0.01;
-/// χ² per degree of freedom near the noise: what is left may be a small effect.
+/// χ² per degree of freedom near the noise: the residual may be a small effect.
 const NEAR_NOISE: f64 = 4.0;
-/// Corrections whose χ² differ by less than this, in units of what is left, cannot be distinguished.
+/// Corrections whose χ² differ by less than this, in units of the residual, cannot be distinguished.
 const SAME_CHI2: f64 = 10.0;
 
 impl<M: Model> Tracing<'_, M> {

@@ -43,7 +43,7 @@ impl<M: Model> Tracing<'_, M> {
         split.then_some(start)
     }
 
-    /// Takes back effects of parts that are 0 within their uncertainty. Says whether there were any.
+    /// Withdraws effects of parts that are 0 within their uncertainty. Says whether there were any.
     pub(super) fn drop_insignificant_parts(&mut self, current: &Refit<M::Fit>) -> bool {
         let is_part = |effect: usize| {
             let found = self.found.iter().map(|found| found.members[0]);

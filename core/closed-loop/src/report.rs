@@ -16,7 +16,7 @@ pub(super) fn known(value: f64) -> Option<f64> {
     value.is_finite().then_some(value)
 }
 
-/// What is left in the end, in one word. Without a noise level known from elsewhere, or without a residual, nothing says that noise
+/// The verdict on the final residual. Without a noise level known from elsewhere, or without a residual, nothing says that noise
 /// only is left; and noise only is not left where a test of the data says so.
 pub(super) fn verdict(left: &Remainder, consistency: &[Check], nothing_added: bool) -> Verdict {
     let consistent = noise_only(left, consistency);

@@ -203,7 +203,7 @@ impl<M: Model> Tracing<'_, M> {
         self.refit_chosen(model, start, &vec![0; self.found.len()])
     }
 
-    /// The same with another member of each set.
+    /// Refits all effects found, jointly, with the chosen member of each confounded set.
     pub(super) fn refit_chosen(&self, model: &M, start: &[Setting], choice: &[usize]) -> Result<Refit<M::Fit>> {
         let mut settings = self.settings.known.clone();
         for (found, member) in self.found.iter().zip(choice) {

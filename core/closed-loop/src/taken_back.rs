@@ -1,4 +1,4 @@
-//! Effects that are taken back: what they explained is explained by others, or was only a part of something unknown.
+//! Effects that are withdrawn: what they explained is explained by others, or was only a part of something unknown.
 
 use super::{
     Fit, Model, Remainder,
@@ -37,20 +37,20 @@ impl<M: Model> Tracing<'_, M> {
         None
     }
 
-    /// Takes back the effects that took only a part of what something unknown does. Says whether there were any.
+    /// Withdraws the effects that took only a part of what something unknown does. Says whether there were any.
     pub(super) fn drop_the_least_bad(&mut self) -> bool {
         let model = self.model;
         self.keep(|found| seen_besides(model, found) || excess(&found.after) <= may_leave(model, found))
     }
 
-    /// Takes back the effects beside which what is left in the end is no small part, though it may be noise: a small stranger
-    /// lets the least bad effect take a part, a small effect leaves nothing.
+    /// Withdraws the effects beside which the residual in the end is no small part, though it may be noise: the least bad effect explains
+    /// a part of a small unmodelled disturbance; a small effect leaves nothing.
     pub(super) fn drop_partial(&mut self, last: &Remainder) -> bool {
         let (model, left) = (self.model, excess(last));
         self.keep(|found| seen_besides(model, found) || left <= may_leave(model, found))
     }
 
-    /// Takes back the others. Says whether there were any.
+    /// Withdraws the others. Says whether there were any.
     fn keep(&mut self, is_kept: impl Fn(&FoundEffect) -> bool) -> bool {
         let (kept, dropped): (Vec<FoundEffect>, Vec<FoundEffect>) =
             std::mem::take(&mut self.found).into_iter().partition(is_kept);

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 pub const FINDING: f64 = 0.005;
 /// Chance below which uncertainty is widened: blocks that disagree by less than what is said still count.
 pub const WIDENING: f64 = 0.05;
-/// The same for three blocks or fewer, whose scatter is known badly.
+/// Chance below which uncertainty is widened, for three blocks or fewer, whose scatter is known badly.
 const WIDENING_OF_FEW: f64 = 0.02;
 /// Blocks that are few.
 const FEW: usize = 3;
@@ -182,7 +182,7 @@ impl Check {
         self
     }
 
-    /// The same of one of several parts, as a station.
+    /// Names the part that the check belongs to, one of several: a station, for example.
     #[must_use]
     pub fn within(mut self, part: &str) -> Self {
         // A setup at a station is "setup/station".

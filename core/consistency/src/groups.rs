@@ -94,7 +94,8 @@ pub fn alike(what: &str, groups: &[Group], level: Level, why: &str) -> Vec<Check
     said(what, groups, compared(groups, level), level, why)
 }
 
-/// The same of groups that are [`compared`] already.
+/// The least likely of groups that are [`compared`] already, and every other one that is a finding, each as a [`Check`]. `what`
+/// names the groups in the plural; `why` gives what a group below the others may come from.
 #[must_use]
 pub fn said(what: &str, groups: &[Group], mut all: Vec<Compared>, level: Level, why: &str) -> Vec<Check> {
     let (count, mut left, mut checks) = (all.len(), groups.to_vec(), Vec::new());

@@ -8,7 +8,7 @@ use crate::{
     structure::Order,
 };
 
-/// Readings at most that are looked at.
+/// Readings at most that are evaluated.
 const FOLLOWED: usize = 200;
 /// Share of the variance that stays independent, so that the weight of a reading has a limit.
 const LEAST_INDEPENDENT: f64 = 1e-3;

@@ -11,7 +11,7 @@ use runout_numerics::{least_squares::dot, statistics::f_tail};
 const AGREED: [f64; 2] = [0.01, 0.001];
 /// Candidates that are many.
 const MANY: usize = 30;
-/// Chance of a gain along correlated errors, or above that of a family's neighbours, below which an effect is believed.
+/// Chance of a gain along correlated errors, or above that of a family's neighbours, below which an effect is accepted.
 const BELIEVED: f64 = 1e-3;
 /// "Very strong" evidence (Kass, Raftery, J. Am. Stat. Assoc. 90 (1995) 773).
 const BIC_LIMIT: f64 = -10.0;
@@ -37,7 +37,7 @@ impl Keys {
 }
 
 impl Keys {
-    /// With what blocks say of an effect: the chance of their agreement on it, nothing where they cannot tell.
+    /// With what blocks say of an effect: the chance of their agreement on it, nothing where they cannot decide.
     #[must_use]
     pub fn beside_blocks(mut self, blocks: &Partition, agreed: Option<f64>, candidates: usize) -> Self {
         let limit = AGREED[usize::from(candidates > MANY)];

@@ -79,7 +79,7 @@ pub struct Correlated {
 }
 
 impl OrderModels {
-    /// Of a fit that left `residual` and has the orthonormal columns `basis`. `None` where too few readings are left to tell.
+    /// Of a fit that left `residual` and has the orthonormal columns `basis`. `None` where too few readings are left to decide.
     #[must_use]
     pub fn of(order: &Order, residual: &[f64], basis: &[Vec<f64>]) -> Option<Self> {
         let (averaged, mut series) = condensed(order, residual.len());
@@ -260,7 +260,7 @@ impl OrderModels {
     }
 }
 
-/// Degrees of freedom from which correlation can be told.
+/// Degrees of freedom from which correlation is observable.
 const FEWEST: usize = 6;
 
 impl Correlated {

@@ -99,9 +99,9 @@ pub fn unlike(residual: &[f64], basis: &[Vec<f64>]) -> Option<Rows> {
     })
 }
 
-/// The same of readings that repeat places, each with a mean of its own: in a place whose squares are unlike those of the others (Cochran's
-/// test, ISO 5725-2) it is the reading farthest from the others there. Indices count all readings, place by place. `None` where too few are
-/// repeated.
+/// Looks for single readings that are not like the others among readings that repeat places, each place with a mean of its own:
+/// in a place whose squares are unlike those of the others (Cochran's test, ISO 5725-2) it is the reading farthest from the
+/// others there. Indices count all readings, place by place. `None` where too few are repeated.
 #[must_use]
 pub fn unlike_repeats(places: &[Vec<f64>]) -> Option<Rows> {
     let mut first = 0;
@@ -179,7 +179,7 @@ struct Suspects {
     rows: Vec<usize>,
     /// What the fit without them leaves of the others; 0 of them.
     left: Vec<f64>,
-    /// Squared length of each reading's column outside that fit: the variance of what is left, in units of the noise.
+    /// Squared length of each reading's column outside that fit: the variance of the residual, in units of the noise.
     free: Vec<f64>,
 }
 
@@ -310,7 +310,7 @@ mod tests {
         }
     }
 
-    /// A profile of 180 points with 162 free harmonics: what is left of a wild point is spread over its neighbours.
+    /// A profile of 180 points with 162 free harmonics: the residual of a wild point is spread over its neighbours.
     #[test]
     fn a_wild_point_of_a_profile_with_many_harmonics_is_named() {
         let mut random = Random::new(11);

@@ -134,7 +134,7 @@ impl Structure {
         self.rows.get(reading).cloned().unwrap_or_else(|| format!("reading {reading}"))
     }
 
-    /// The same for readings in another order: reading `i` of it was `places[i]`.
+    /// The structure for readings in another order: reading `i` of it was `places[i]`.
     #[must_use]
     pub fn sorted(&self, places: &[usize]) -> Self {
         fn pick<T: Clone>(from: &[T], places: &[usize]) -> Vec<T> {

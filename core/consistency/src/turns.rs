@@ -151,7 +151,7 @@ impl TurnTable {
         self.coefficients[(row * self.orders + order - 1) * self.channels + channel]
     }
 
-    /// The same coefficient in every row.
+    /// The coefficient of an order and channel in every row.
     fn series(&self, order: usize, channel: usize) -> impl Iterator<Item = Complex64> + Clone + '_ {
         (0..self.rows()).map(move |row| self.at(row, order, channel))
     }

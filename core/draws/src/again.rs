@@ -36,7 +36,7 @@ impl Draw {
 /// What may be true, and is measured again.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Truth {
-    /// What was found, less what noise alone may have made: what is left is raised most by noise.
+    /// What was found, less what noise alone may have made: noise raises the rest most.
     Least,
     /// What was found, with its noise: what is there is raised least.
     Most,
@@ -65,9 +65,9 @@ pub struct MeasuredAgain {
 
 /// What is known of values. `measure` measures a truth again.
 ///
-/// What an error is on average, noise has raised the value by: the interval takes it back (basic bootstrap: Davison, Hinkley, *Bootstrap
-/// Methods*, 1997, section 2.4). It contains those of all truths, and what noise may have hidden itself: near 0, the size of what is hidden is not
-/// that of an error.
+/// Noise has raised the value by the mean of the errors, which is subtracted from the interval (basic bootstrap: Davison, Hinkley,
+/// *Bootstrap Methods*, 1997, section 2.4). It contains those of all truths, and what noise may have hidden itself: near 0, the size
+/// of what is hidden is not that of an error.
 pub fn measured_again(
     values: &[f64],
     seed: u64,

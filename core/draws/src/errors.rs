@@ -155,8 +155,8 @@ impl Errors {
         some.then_some(Self { sources })
     }
 
-    /// The same, of which the next so many draws have the power at each order that all have on average: else the standard deviation of so few would be
-    /// off by 1/√(2·draws).
+    /// The errors, scaled so that the next so many draws have the power at each order that all have on average: else the standard
+    /// deviation of so few would be off by 1/√(2·draws).
     #[must_use]
     pub(crate) fn balanced(mut self, draws: usize) -> Self {
         for Source { draws: numbers, amplitudes } in &mut self.sources {

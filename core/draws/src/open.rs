@@ -23,7 +23,7 @@ use crate::{
     spectrum::VarianceFrom,
 };
 
-/// Draws of each form, and the fewest of a long profile: all of them together look at about so many points.
+/// Draws of each form, and the fewest of a long profile: all of them together evaluate about so many points.
 const DRAWS: usize = 100;
 const FEWEST_DRAWS: usize = 50;
 const POINTS_DRAWN: usize = 4_000_000;

@@ -16,7 +16,7 @@ use crate::{
 
 /// Transforms of each form, of [`TURNS`] draws each: with 100 draws the ends of an interval are the second from each end.
 const TRANSFORMS: usize = 25;
-/// The same of a wall so large that they would take too long, at least.
+/// Transforms of each form, at least, of a wall so large that [`TRANSFORMS`] would take too long.
 const FEWEST_TRANSFORMS: usize = 6;
 /// Noise has no place: turned by a part of a turn, it is noise again.
 const TURNS: usize = 4;
@@ -100,7 +100,7 @@ impl Draws {
         Some(Self { sections, sources, together, wider, lowest, transforms: TRANSFORMS })
     }
 
-    /// The same of so many draws in all, or less where there are less.
+    /// Limits the draws to `draws` in all, or fewer where there are fewer.
     #[must_use]
     pub fn with_draws(self, draws: usize) -> Self {
         Self { transforms: (draws / (4 * TURNS)).clamp(FEWEST_TRANSFORMS, TRANSFORMS), ..self }
@@ -246,7 +246,7 @@ impl Profiles<'_> {
         all.map(|((found, processed), sides)| Interval::of(found, processed, sides, refuted)).collect()
     }
 
-    /// The same of values of one whole profile.
+    /// Intervals of values of one whole profile: `look` adds the values of a profile, first undisturbed, then with noise.
     pub fn values_of_section(&self, mut look: impl FnMut(&[f64], &mut Vec<f64>)) -> Vec<Interval> {
         let mut whole = Vec::with_capacity(self.angles);
         self.values(|kind, noise, found| {

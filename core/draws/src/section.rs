@@ -15,13 +15,13 @@ use crate::{
 
 /// Marks that stand out by so many standard deviations are certain; so many at most.
 const CERTAIN: (f64, usize) = (5.0, 6);
-/// The same for a wall of sections, any of which may have one by chance.
+/// Standard deviations from which a mark is certain in a wall of sections, any of which may have one by chance.
 const CERTAIN_OF_WALL: f64 = 5.5;
 /// Marks beside them that there may be.
 const POSSIBLE: (f64, usize) = (2.5, 2);
 /// Waves that noise has beyond this quantile are there; noise alone makes some in one of a few hundred sections.
 const SEEN: f64 = 3.3;
-/// The same for a wall of sections.
+/// Quantile of noise beyond which waves are there, for a wall of sections.
 const SEEN_OF_WALL: f64 = 4.0;
 /// An order of its own is certain, is taken for form, and may be form, where noise has its power with a chance of e to minus this.
 const SHOWN_LEAST: f64 = 14.0;

@@ -8,7 +8,7 @@ use runout_numerics::Complex64;
 const FEWEST_BESIDE: usize = 4;
 /// A line is an order of more power than waves and noise have together, by a chance of e⁻⁹.
 pub(crate) const LINE: f64 = 9.0;
-/// Looks at which orders are lines: those found at the first are left out at the second.
+/// Passes that decide which orders are lines: those found in the first are left out in the second.
 const LOOKS: usize = 2;
 /// Squares that a variance is taken to be known from at least where its chance is weighed: a mean of x⁻¹ of fewer hardly exists.
 const FEWEST_SQUARES: f64 = 8.0;

@@ -77,7 +77,7 @@ impl Uncertainty {
         Self::new(std, [low, value + reach], 0)
     }
 
-    /// The same with an interval so many times as wide about its middle.
+    /// Makes the interval `factor` times as wide about its middle.
     #[must_use]
     pub fn widened(mut self, factor: f64) -> Self {
         let [low, high] = self.interval_95;
@@ -88,7 +88,7 @@ impl Uncertainty {
         self
     }
 
-    /// The same of a value that is larger by so much; an interval from 0 on stays one.
+    /// The uncertainty of a value that is larger by `by`: the interval moves as far; an interval that is not below 0 stays so.
     #[must_use]
     pub fn moved(mut self, by: f64) -> Self {
         let floor = if self.interval_95[0] >= 0.0 { 0.0 } else { f64::NEG_INFINITY };
@@ -96,8 +96,8 @@ impl Uncertainty {
         self
     }
 
-    /// The same where the data do not decide between `value` and these: the largest distance from it is added to the standard
-    /// uncertainty, and the interval reaches as far beyond each of them as beyond it.
+    /// The uncertainty where the data do not decide between `value` and `equivalents`: the largest distance from `value` is added
+    /// to the standard uncertainty, and the interval reaches as far beyond each of them as beyond `value`.
     #[must_use]
     pub fn with_equivalents(mut self, value: f64, equivalents: &[f64]) -> Self {
         let distances = || equivalents.iter().map(|other| other - value).filter(|distance| distance.is_finite());

@@ -1,4 +1,4 @@
-//! How often intervals of values of closed profiles hold the truth, by form and noise: the table of docs/appendix/intervals.md.
+//! How often intervals of values of closed profiles cover the true value, by form and noise: the table of docs/appendix/intervals.md.
 //!
 //! Forms, noise and variances that are known badly are drawn here; values are those of profiles on angles.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests; one prints a table")]
@@ -176,7 +176,7 @@ fn values(profile: usize, heights: &[f64]) -> Vec<f64> {
     }
 }
 
-/// The same order as [`NAMES`].
+/// Values of all profiles in the order of [`NAMES`].
 fn in_order(of_profiles: [Vec<f64>; 5]) -> Vec<f64> {
     let [all, of_50, of_15, slopes, slopes_of_15] = of_profiles;
     [&all[..4], &of_50, &of_15, &slopes, &slopes_of_15, &all[4..]].concat()
@@ -244,7 +244,7 @@ fn cells(form: Form, of_three_sensors: bool, std_um: f64, known: Known, trials: 
 
 /// Two forms of each kind that any change of the method has failed at.
 #[test]
-fn intervals_hold_the_truth_of_unlike_forms() {
+fn intervals_cover_the_true_value_of_unlike_forms() {
     const TRIALS: u64 = 40;
     for (form, of_three_sensors, std_um) in [
         (5, false, 0.05),
@@ -275,7 +275,7 @@ fn outside_where_stated_too_large(form: usize, std_um: f64, times: f64) -> Vec<(
 
 /// A variance that the data refute as too large does not make an interval too narrow.
 #[test]
-fn intervals_hold_the_truth_where_noise_is_stated_too_large() {
+fn intervals_cover_the_true_value_where_noise_is_stated_too_large() {
     for (form, std_um, times) in [
         (0, 0.1, 30.0),
         (0, 0.1, 100.0),

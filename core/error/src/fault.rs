@@ -64,13 +64,13 @@ impl Fault {
         self
     }
 
-    /// The same fault, seen from the table that holds this one under `key`.
+    /// Puts `key` before the fault's path: its place in the table that holds this one under `key`.
     #[must_use]
     pub fn under(self, key: impl Into<String>) -> Self {
         self.prefixed([Step::Key(key.into())])
     }
 
-    /// The same fault, seen from the table that holds an array `key` with this one as its item `index`.
+    /// Puts `key` and `index` before the fault's path: its place in the table that holds an array `key` with this one as its item `index`.
     #[must_use]
     pub fn under_item(self, key: impl Into<String>, index: usize) -> Self {
         self.prefixed([Step::Key(key.into()), Step::Index(index)])

@@ -22,7 +22,7 @@ use runout_standards::{
 };
 use runout_turning::surface::{Section, Surface, Uncertain};
 
-/// Points that all draws look at together, about: a large surface has fewer draws, a small one more.
+/// Points that all draws evaluate together, about: a large surface has fewer draws, a small one more.
 const POINTS_DRAWN: usize = 8_000_000;
 const PAIRS: std::ops::RangeInclusive<usize> = 10..=48;
 
@@ -382,7 +382,7 @@ fn found(
     NumberFound { uncertainty: known.ok(), no_uncertainty, ..NumberFound::of(value, None) }
 }
 
-/// How areal values depend on errors, in the order of [`areal::PARAMETERS`]; or why their intervals do not hold.
+/// How areal values depend on errors, in the order of [`areal::PARAMETERS`]; or why their intervals do not cover the true value.
 fn sensitivity(index: usize) -> std::result::Result<Sensitivity, &'static str> {
     match index {
         // Sq, Ssk, Sku, Sa, Sal … Sdr.

@@ -1,4 +1,4 @@
-//! Values of an axis at standing positions: beside closed forms, with few or uneven positions, and how often their intervals hold the truth.
+//! Values of an axis at standing positions: beside closed forms, with few or uneven positions, and how often their intervals cover the true value.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests; some print shares for the documentation")]
 
@@ -299,7 +299,7 @@ fn random_motion(seed: u64, highest: i32) -> impl Fn(f64) -> [f64; 5] {
     }
 }
 
-/// How errors are made, and what is told of them.
+/// How errors are made, and what is stated of them.
 #[derive(Debug, Clone, Copy)]
 enum Told {
     /// Their standard deviations, exactly.
@@ -310,7 +310,7 @@ enum Told {
     WithCommon,
 }
 
-/// Of each value the trials of which an interval holds the truth.
+/// Of each value the trials of which an interval covers the true value.
 fn held(count: usize, std_um: f64, told: Told, trials: u64) -> Vec<(String, usize)> {
     let text = "values = ['error-motion']\ncentres = ['LSC', 'MZC']";
     let mut held: Vec<(String, usize)> = Vec::new();
@@ -374,7 +374,7 @@ fn held(count: usize, std_um: f64, told: Told, trials: u64) -> Vec<(String, usiz
 }
 
 #[test]
-fn intervals_hold_the_truth() {
+fn intervals_cover_the_true_value() {
     for (count, std_um, told) in [
         (36, 0.02, Told::Exactly),
         (36, 0.3, Told::Exactly),

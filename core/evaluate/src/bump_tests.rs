@@ -1,4 +1,4 @@
-//! How often intervals of a mean deviation hold the truth of a bump that noise hides order by order, by a profile that shares no formula with
+//! How often intervals of a mean deviation cover the true value of a bump that noise hides order by order, by a profile that shares no formula with
 //! the evaluation: heights at angles, white noise at each, harmonics by sums over all angles.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
@@ -35,7 +35,7 @@ fn mean_deviation(waves: &[(usize, Complex64)]) -> f64 {
 }
 
 #[test]
-fn intervals_of_ra_hold_the_truth_beside_a_bump_that_noise_hides() {
+fn intervals_of_ra_cover_the_true_value_beside_a_bump_that_noise_hides() {
     let evaluate = evaluate("values = ['texture']").unwrap();
     for (lobes_um, width, noise_um) in
         [(0.0, 0.02, 0.02), (0.1, 0.05, 0.02), (0.2, 0.01, 0.05), (0.5, 0.05, 0.1), (2.0, 0.02, 0.05)]

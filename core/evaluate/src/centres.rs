@@ -11,7 +11,7 @@ use runout_draws::Uncertainty;
 
 /// Share of noise that the largest error of several centres exceeds.
 const BEYOND: f64 = 0.05;
-/// The same share of draws; fewer, as the quantile is known from some hundred of them.
+/// Share of draws that the largest error of several centres exceeds. It is smaller than [`BEYOND`], as the quantile is known from some hundred draws.
 const OF_DRAWS_BEYOND: f64 = 0.025;
 /// From so many times the largest error on, draws give the interval.
 const CLEAR: f64 = 4.0;
@@ -76,7 +76,7 @@ mod tests {
     const Z_MM: [f64; 5] = [0.0, 5.0, 10.0, 15.0, 20.0];
     const DATUMS: [usize; 2] = [0, 4];
 
-    /// Centres with noise about a straight axis, section 1 beside it by so much: how often both intervals hold the truth.
+    /// Centres with noise about a straight axis, section 1 beside it by so much: how often both intervals cover the true value.
     fn held(beside_um: f64) -> [f64; 2] {
         let mut random = ChaCha8Rng::seed_from_u64(7);
         let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
@@ -107,7 +107,7 @@ mod tests {
     }
 
     #[test]
-    fn intervals_hold_distances_from_nothing_to_far_above_noise() {
+    fn intervals_cover_distances_from_zero_to_far_above_noise() {
         for beside_um in [0.0, 0.003, 0.01, 0.1, 1.0] {
             let [one, all] = held(beside_um);
             // Of an amplitude between noise and twice that, the lower end at 0 adds some.

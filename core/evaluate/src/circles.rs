@@ -22,7 +22,7 @@ pub struct ReferenceCircle {
     pub radius_um: f64,
     /// Part angle of the highest point in degrees, and its deviation from the circle in µm.
     pub peak: [f64; 2],
-    /// The same of the lowest point.
+    /// Part angle of the lowest point in degrees, and its deviation from the circle in µm.
     pub valley: [f64; 2],
     /// RONt about it, in µm.
     pub ront_um: f64,

@@ -1,4 +1,4 @@
-//! How often stated intervals of roundness, texture and areal values hold the truth.
+//! How often stated intervals of roundness, texture and areal values cover the true value.
 //!
 //! Long because all of them simulate the same spectra.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests; some print tables for the documentation")]
@@ -46,7 +46,7 @@ impl Spectrum {
     }
 }
 
-/// Of each value: symbol, filter, trials that state an interval, and those of which it holds the truth.
+/// Of each value: symbol, filter, trials that state an interval, and those of which it covers the true value.
 struct Coverage(Vec<(String, String, usize, usize)>);
 
 impl Coverage {
@@ -110,7 +110,7 @@ fn intervals(text: &str, spectrum: Spectrum, std_um: f64, trials: u64) -> Covera
 }
 
 #[test]
-fn texture_intervals_hold_the_truth() {
+fn texture_intervals_cover_the_true_value() {
     let found = texture_intervals(Spectrum::Lines, 0.003, 60);
     for (symbol, filter) in [("Ra", "none"), ("Ra", "Gaussian λc 8 mm"), ("Rq", "Gaussian λc 8 mm")] {
         let (stated, share) = found.share(symbol, filter);
@@ -259,7 +259,7 @@ fn areal_intervals(spectrum: Spectrum, std_um: f64, rings: usize, angles: usize,
 }
 
 #[test]
-fn areal_intervals_hold_the_truth() {
+fn areal_intervals_cover_the_true_value() {
     let count = trials(60);
     let found = areal_intervals(Spectrum::Lines, 0.03, 8, 128, count as u64);
     for symbol in ["Sq", "Sa", "Sdq", "Sal"] {

@@ -1,4 +1,4 @@
-//! Values of open profiles and height maps beside brute force, and how often their intervals hold the truth.
+//! Values of open profiles and height maps beside brute force, and how often their intervals cover the true value.
 //! Long because all of them simulate the same open profiles and maps.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests; one prints a table for the documentation")]
@@ -120,7 +120,7 @@ fn find<'a>(values: &'a [Value], symbol: &str, reference: &str) -> &'a Value {
     values.iter().find(|value| value.symbol == symbol && value.reference.as_deref() == Some(reference)).unwrap()
 }
 
-/// Of each value, trials with an interval and those of which it holds the truth.
+/// Of each value, trials with an interval and those of which it covers the true value.
 type Shares = Vec<(String, usize, usize)>;
 
 const ALL: &str = "values = ['straightness', 'texture']\nlambda_c_mm = 40.0";
@@ -156,7 +156,7 @@ fn shares(shape: Shape, noise: Noise, std_um: f64, trials: u64, text: &str) -> S
 }
 
 #[test]
-fn intervals_of_straightness_hold_the_truth() {
+fn intervals_of_straightness_cover_the_true_value() {
     // From a noise far below the form to one as large.
     let noises = [
         (Noise::Known, 0.01),
@@ -205,7 +205,7 @@ fn intervals_of_open_texture_by_noise() {
     print_shares(ALL, 200);
 }
 
-/// A Gaussian regression of degree 1 at each point, every point of the profile a neighbour; then sums over what is left.
+/// A Gaussian regression of degree 1 at each point, every point of the profile a neighbour; then sums over the residual.
 #[test]
 fn values_of_an_open_profile_are_those_of_brute_force() {
     let (z, heights) = (z_mm(), truth(Shape::Power, 7));

@@ -1,4 +1,4 @@
-//! How often intervals of roundness hold the truth of forms whose extremes are unlike those of waves at random: a scratch, and lobes that are
+//! How often intervals of roundness cover the true value of forms whose extremes are unlike those of waves at random: a scratch, and lobes that are
 //! alike. Profiles share no formula with the evaluation.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
@@ -114,7 +114,7 @@ fn lobes(random: &mut ChaCha8Rng, order: usize) -> Waves {
 
 /// Two scratches that noise hides in part, many lobes that are alike, and two whose opposite contacts hold MICI and MCCI loosely.
 #[test]
-fn intervals_hold_the_truth_of_extremes_unlike_those_of_waves() {
+fn intervals_cover_the_true_value_of_extremes_unlike_those_of_waves() {
     let profiles = trials(60);
     let least = fewest(profiles, [52, 60], 0.95) as u32;
     let check = |case: &str, all: BTreeMap<&'static str, Held>| {

@@ -35,7 +35,7 @@ impl Filter {
         Self { name: robust_name(cutoff_upr), ..Self::low_pass(Some(cutoff_upr)) }
     }
 
-    /// The same filter by this name for values that no order of a turn is taken from or left out of: along the axis.
+    /// The filter, with its name, for values along the axis: it has no band of orders of a turn.
     pub(crate) fn along_axis(&self) -> Self {
         Self { name: self.name.clone(), kind: self.kind, band: Band::default() }
     }

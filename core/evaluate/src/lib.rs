@@ -117,7 +117,7 @@ impl NumberFound {
         Self { value, uncertainty, no_uncertainty: None, raised_by_noise: known.and_then(Interval::raised_by_noise) }
     }
 
-    /// The same without what is known of its error, and why.
+    /// The number without its uncertainty, and why it has none.
     fn without_uncertainty(self, reason: &str) -> Self {
         Self { uncertainty: None, no_uncertainty: Some(reason.to_owned()), raised_by_noise: None, ..self }
     }

@@ -1,4 +1,4 @@
-//! How often intervals of roundness hold the truth where errors are large, by profiles that share no formula with the evaluation: sums of
+//! How often intervals of roundness cover the true value where errors are large, by profiles that share no formula with the evaluation: sums of
 //! cosines at angles, white noise at each angle, harmonics by sums over all angles, and reference circles by search over centres and by
 //! Welzl's algorithm on very many points.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests; one prints a table for the documentation")]
@@ -23,7 +23,7 @@ use runout_numerics::Complex64;
 pub(super) const ANGLES: usize = 512;
 /// Highest order that is kept of it.
 pub(super) const HIGHEST: usize = 250;
-/// Angles at which the true profile is looked at.
+/// Angles at which the true profile is evaluated.
 pub(super) const DENSE: usize = 4096;
 
 /// A form as waves (order, amplitude, phase).
@@ -185,7 +185,7 @@ pub(super) fn truth(waves: &Waves, random: &mut ChaCha8Rng) -> BTreeMap<&'static
     found
 }
 
-/// Of each value, intervals that hold the truth and those stated, of so many profiles with noise of this standard deviation at an angle.
+/// Of each value, intervals that cover the true value and those stated, of so many profiles with noise of this standard deviation at an angle.
 fn intervals(text: &str, lines: bool, noise_um: f64, profiles: u64) -> BTreeMap<&'static str, [u64; 2]> {
     let evaluate = evaluate(text).unwrap();
     // White noise at all angles, of which the average keeps these orders.
@@ -220,7 +220,7 @@ fn intervals(text: &str, lines: bool, noise_um: f64, profiles: u64) -> BTreeMap<
 const UNFILTERED: &str = "values = ['roundness']\nreferences = ['LSCI', 'MZCI', 'MCCI']\nfilter_upr = []";
 
 #[test]
-fn intervals_hold_the_truth_where_errors_are_large() {
+fn intervals_cover_the_true_value_where_errors_are_large() {
     let profiles = trials(60);
     for (lines, noise_um) in [(true, 0.1), (false, 0.1), (false, 0.003)] {
         for (name, [inside, stated]) in intervals(UNFILTERED, lines, noise_um, profiles as u64) {
@@ -234,7 +234,7 @@ fn intervals_hold_the_truth_where_errors_are_large() {
 }
 
 /// Lobes of 1.5 µm seen by three sensors: each order's noise is that of a reading over what the sensors' weighted sum sees of the order, which
-/// differs a hundredfold. Of each value, intervals that hold the truth, of so many profiles.
+/// differs a hundredfold. Of each value, intervals that cover the true value, of so many profiles.
 fn intervals_of_lobes(lobes: usize, noise_um: f64, profiles: u64) -> BTreeMap<&'static str, u64> {
     const ORDERS: usize = 63;
     const TURNS: f64 = 59.0;
@@ -262,7 +262,7 @@ fn intervals_of_lobes(lobes: usize, noise_um: f64, profiles: u64) -> BTreeMap<&'
         result.station = format!("lobes {number}");
         // As few as a run gives: two a wave of the highest order.
         result.angles = 2 * (ORDERS + 1);
-        // Forty squares tell the noise of each five orders.
+        // The noise of each five orders is known from forty squares.
         result.separation.freedom = 8;
         for five in (2..=ORDERS).collect::<Vec<_>>().chunks(5) {
             let chance = (0..40).map(|_| normal().powi(2)).sum::<f64>() / 40.0;
@@ -282,7 +282,7 @@ fn intervals_of_lobes(lobes: usize, noise_um: f64, profiles: u64) -> BTreeMap<&'
 }
 
 #[test]
-fn intervals_of_lobes_hold_where_noise_depends_on_the_order() {
+fn intervals_of_lobes_cover_the_true_value_where_noise_depends_on_the_order() {
     for (lobes, noise_um) in [(3, 0.01), (15, 0.03)] {
         for (name, held) in intervals_of_lobes(lobes, noise_um, 60) {
             println!("{lobes} lobes, {noise_um} µm, {name}: {held} of 60");
@@ -293,7 +293,7 @@ fn intervals_of_lobes_hold_where_noise_depends_on_the_order() {
 }
 
 /// A fine wave on lobes that have nearly all of the form's power, and errors whose power falls as 1/order^`falls`: the crests are those of
-/// the fine wave, of which the angles of the draws have less than three. Of each value, intervals that hold the truth, of so many profiles.
+/// the fine wave, of which the angles of the draws have less than three. Of each value, intervals that cover the true value, of so many profiles.
 fn intervals_of_fine_waves(fine_um: f64, falls: f64, noise_um: f64, profiles: u64) -> BTreeMap<&'static str, u64> {
     let falling = |order: usize| (order as f64).powf(-falls);
     let whole: f64 = (2..=HIGHEST).map(falling).sum();
@@ -329,7 +329,7 @@ fn intervals_of_fine_waves(fine_um: f64, falls: f64, noise_um: f64, profiles: u6
 }
 
 #[test]
-fn intervals_of_fine_waves_hold_where_lobes_and_low_orders_have_the_power() {
+fn intervals_of_fine_waves_cover_the_true_value_where_lobes_and_low_orders_have_the_power() {
     for (fine_um, falls, noise_um) in [(0.3, 2.0, 0.01), (0.3, 1.0, 0.01), (0.3, 0.5, 0.01), (0.03, 1.0, 0.1)] {
         let profiles = trials(60);
         for (name, held) in intervals_of_fine_waves(fine_um, falls, noise_um, profiles as u64) {
@@ -343,7 +343,7 @@ fn intervals_of_fine_waves_hold_where_lobes_and_low_orders_have_the_power() {
 
 /// Lobes that are alike in little noise: crests of 15 compete for the highest behind a filter; of two, the centre moves along the long axis.
 #[test]
-fn intervals_of_like_lobes_hold_where_noise_is_small() {
+fn intervals_of_like_lobes_cover_the_true_value_where_noise_is_small() {
     for (order, filter, passed, names) in
         [(15, "Gaussian 15 UPR", 0.5, &["RONt LSCI", "RONp LSCI", "RONt MZCI"][..]), (2, "none", 1.0, &["RONt MCCI"])]
     {

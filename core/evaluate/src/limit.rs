@@ -167,7 +167,7 @@ impl LimitValue {
         above.min(below / self.upper.unwrap_or(1.0))
     }
 
-    /// The same section's value of an order that is lost.
+    /// The section's value at an order that is lost: no number, undecided, with the reason.
     pub(crate) fn lost(&self, order: usize, upper: Option<f64>, reason: String) -> Self {
         Self {
             band_upr: [order; 2],

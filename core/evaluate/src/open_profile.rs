@@ -16,7 +16,7 @@ const FEWEST: usize = 7;
 /// Places of Rq, and of Rsk and Rku, in [`texture::PARAMETERS`].
 const RQ: usize = 1;
 const SHAPE: [usize; 2] = [2, 3];
-/// Share of the errors in the square of Rq up to which intervals of Rsk and Rku of a line hold the truth; at 3 %, 90 %
+/// Share of the errors in the square of Rq up to which intervals of Rsk and Rku of a line cover the true value; at 3 %, 90 %
 /// (`intervals_of_open_texture_by_noise`, a step beside weak waves).
 const SHAPE_SHOWN: f64 = 0.01;
 /// Why there is none beyond.

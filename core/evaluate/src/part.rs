@@ -22,7 +22,7 @@ pub struct PartSummary {
     pub remarks: Vec<String>,
 }
 
-/// Angles at which a wall is looked at, at most: a surface's usual ones.
+/// Angles at which a wall is evaluated, at most: a surface's usual ones.
 const MOST_ANGLES: usize = 720;
 
 /// Cylindricity of sections about a nominal radius; `None` where they do not lie at two heights. `placed` says that their

@@ -77,7 +77,7 @@ impl Wall {
         values
     }
 
-    /// Gives diameters that hold the centres of sections an interval that holds near 0 too.
+    /// Gives diameters that contain the centres of sections an interval that covers the true value near 0 too.
     fn diameters(&self, values: &mut [Value], filter: &Filter, datums: &[usize], others: &[usize]) {
         let largest_um = others.iter().map(|ring| self.centre_std_um(filter, *ring, datums)).fold(0.0, f64::max);
         for value in values.iter_mut().filter(|value| ["coaxiality", "STRsa"].contains(&value.symbol.as_str())) {
@@ -134,7 +134,7 @@ impl Wall {
         ]
     }
 
-    /// Gives the largest sizes of lines an interval that holds near 0 too.
+    /// Gives the largest sizes of lines an interval that covers the true value near 0 too.
     fn sizes(&self, values: &mut [Value], filter: &Filter) {
         let errors = self.errors(filter).unwrap_or_default();
         let most_um = LARGEST_SIZE * LARGEST * errors.iter().map(Errors::std_um).fold(0.0, f64::max);

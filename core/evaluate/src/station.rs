@@ -70,7 +70,7 @@ impl EvaluatedStation {
         Self { result, values, circles, motion_values, readings }
     }
 
-    /// The same, with what refutes the values and circles of the form that nothing of the station's own refutes.
+    /// Adds what refutes the values and circles of the form, where nothing of the station's own refutes them.
     #[must_use]
     pub fn refuted_by(mut self, by: Option<&str>) -> Self {
         let of_values = self.values.iter_mut().flatten().map(|value| &mut value.refuted_by);

@@ -164,9 +164,9 @@ fn texture_lies_between_its_wavelengths() {
     assert!(find(&values, "Ra", "mean line", "none").value > 5.0);
 }
 
-/// 95 % intervals of values that are not linear hold the truth about as often as they say.
+/// 95 % intervals of values that are not linear cover the true value about as often as they say.
 #[test]
-fn intervals_hold_the_truth() {
+fn intervals_cover_the_true_value() {
     let count = trials(200);
     let truth = [lobes(2, 1.0), lobes(3, 2.0), lobes(5, 0.7)];
     let evaluate = evaluate("values = ['roundness']\nreferences = ['MZCI']\nfilter_upr = []").unwrap();
@@ -204,11 +204,11 @@ fn all_groups_are_asked_for_by_one_word() {
     assert!(unknown("values = ['area']").contains("areal"), "{}", unknown("values = ['area']"));
 }
 
-/// The same of the steepest slope, of which noise of high orders is a good part: forms of 4 µm that fall with order⁻¹ to 60
-/// and with order⁻² to 20, errors of 4 nm and (of the first) 10 nm at every angle in orders to 255, of a variance known from 20
-/// degrees of freedom.
+/// 95 % intervals of the steepest slope, of which noise of high orders is a good part, cover the true value: forms of 4 µm that
+/// fall with order⁻¹ to 60 and with order⁻² to 20, errors of 4 nm and (of the first) 10 nm at every angle in orders to 255, of a
+/// variance known from 20 degrees of freedom.
 #[test]
-fn intervals_of_the_steepest_slope_hold_the_truth() {
+fn intervals_of_the_steepest_slope_cover_the_true_value() {
     const HIGHEST: usize = 255;
     let count = trials(300);
     let evaluate = evaluate("values = ['roundness']\nreferences = ['LSCI']\nfilter_upr = []").unwrap();
@@ -294,7 +294,7 @@ fn centred_sections_have_their_form_and_no_taper() {
     assert!(found.remarks[0].contains("CYLtt"));
 }
 
-/// Shares of 95 % intervals of cylindricity that hold the truth, and the stated standard uncertainty over the errors' standard
+/// Shares of 95 % intervals of cylindricity that cover the true value, and the stated standard uncertainty over the errors' standard
 /// deviation: four sections with orders to 30 of 1/n µm, errors of `noise_um`/√n at order n.
 fn cylindricity_intervals(text: &str, noise_um: f64, trials: u64) -> Vec<(String, f64, f64)> {
     const HIGHEST: usize = 30;
@@ -353,10 +353,10 @@ fn cylindricity_intervals(text: &str, noise_um: f64, trials: u64) -> Vec<(String
 }
 
 #[test]
-fn intervals_of_cylindricity_hold_the_truth() {
+fn intervals_of_cylindricity_cover_the_true_value() {
     for noise_um in [0.02, 0.3] {
         for (name, inside, ratio) in cylindricity_intervals("references = ['LSCI']\nfilter_upr = []", noise_um, 60) {
-            // 95 % of 60 are 57 ± 1.7. Below 0.1 µm; above, noise is as large as the form, and only the size of ± is looked at.
+            // 95 % of 60 are 57 ± 1.7. Below 0.1 µm; above, noise is as large as the form, and only the size of ± is examined.
             assert!(noise_um > 0.1 || inside >= 0.85, "{name}, {noise_um} µm: {inside}");
             // A standard deviation of 60 is known to 9 %. Above, the least form is next to nothing, and ± reaches that far.
             assert!(
@@ -382,7 +382,7 @@ fn intervals_of_cylindricity_by_noise() {
 
 /// 95 % intervals of RONt about MICI and MCCI with two lobes, whose contacts are nearly opposite each other.
 #[test]
-fn intervals_hold_the_truth_with_nearly_opposite_contacts() {
+fn intervals_cover_the_true_value_with_nearly_opposite_contacts() {
     const HIGHEST: usize = 30;
     let count = trials(300);
     let text = "values = ['roundness']\nreferences = ['MICI', 'MCCI']\nfilter_upr = []";
@@ -444,7 +444,7 @@ fn placed_sections_have_taper_bend_and_coaxiality() {
 
 /// Centres of noise alone: intervals of their distances from the datum axis begin at 0 and end above what was found.
 #[test]
-fn intervals_of_coaxial_sections_hold_nothing() {
+fn intervals_of_coaxial_sections_begin_at_zero() {
     let mut random = ChaCha8Rng::seed_from_u64(11);
     let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
     let (std, walls) = (0.003, trials(60));
@@ -592,7 +592,7 @@ fn sections_have_their_position_about_a_datum_axis() {
 }
 
 #[test]
-fn intervals_of_positions_hold_the_truth() {
+fn intervals_of_positions_cover_the_true_value() {
     let count = trials(60);
     let text = "references = ['LSCI']\nfilter_upr = []\ndatum = ['s0', 's20']";
     let variance = 4e-4;
@@ -633,9 +633,9 @@ fn intervals_of_positions_hold_the_truth() {
 }
 
 /// Walls that are straight and parallel, and walls that are less and less so: the values grow with noise, and their intervals
-/// hold the truth.
+/// cover the true value.
 #[test]
-fn intervals_of_lines_hold_from_zero_on() {
+fn intervals_of_lines_cover_the_true_value_from_zero_on() {
     let count = trials(40);
     let variance = 4e-4;
     for form_um in [0.0, 0.005, 0.03, 0.3] {

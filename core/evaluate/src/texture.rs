@@ -8,7 +8,7 @@ use runout_standards::texture::{self, Kind, Settings};
 /// [`POINTS_A_WAVE`] where errors are drawn: there a value's error is sought, not the value. Differences over seven points are
 /// then 0.9 % low at the highest order.
 const DRAWN_POINTS_A_WAVE: usize = 6;
-/// Angles at which a profile is looked at are a multiple of this, for the sake of the transform.
+/// Angles at which a profile is evaluated are a multiple of this, for the sake of the transform.
 const WHOLE: usize = 256;
 
 /// Why values that count elements have no uncertainty.
@@ -18,7 +18,7 @@ const COUNTED: &str = "it counts hills and dales: an error that makes or merges 
 const OF_PLATEAUS: &str = "it is read from the material ratio curve where single hills and dales of one profile decide: intervals \
     by draws hold the truth in fewer than 95 %";
 
-/// Why intervals of a value of a profile do not hold, in the order of [`texture::PARAMETERS`].
+/// Why intervals of a value of a profile do not cover the true value, in the order of [`texture::PARAMETERS`].
 pub(super) fn no_interval(index: usize) -> Option<&'static str> {
     match index {
         // Ra, Rq, Rsk, Rku, Rt, Rdq, Rp, Rv, Rz, Rz1max.

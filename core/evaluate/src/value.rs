@@ -130,19 +130,19 @@ impl Value {
         }
     }
 
-    /// The same of one of several parts.
+    /// Names the part that the value is of, where a result has several.
     #[must_use]
     pub fn of(self, of: impl Into<String>) -> Self {
         Self { of: Some(of.into()), ..self }
     }
 
-    /// The same as one of the few that a result opens with.
+    /// Marks the value as one of the few that a result opens with.
     #[must_use]
     pub fn key(self) -> Self {
         Self { is_key: true, ..self }
     }
 
-    /// The same of an amplitude, a range or a root mean square, none of which is below 0: nor is its interval.
+    /// Limits the interval to 0 and above: that of an amplitude, a range or a root mean square, none of which is below 0.
     #[must_use]
     pub fn not_negative(mut self) -> Self {
         if let Some(known) = &mut self.uncertainty {
@@ -151,7 +151,7 @@ impl Value {
         self
     }
 
-    /// The same, refuted by what its own data say.
+    /// Adds what of the value's own data refutes it; without a new reason, an earlier one stays.
     #[must_use]
     pub fn refuted_by(self, by: Option<String>) -> Self {
         Self { refuted_by: by.or(self.refuted_by), ..self }

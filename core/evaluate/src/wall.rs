@@ -12,9 +12,9 @@ use runout_numerics::{
 use runout_standards::{cylindricity::Section, gaps::Gaps, roundness::Angles};
 use runout_turning::surface;
 
-/// Points that all draws of one filter look at together, about: a wall of many sections has fewer draws.
+/// Points that all draws of one filter evaluate together, about: a wall of many sections has fewer draws.
 const POINTS_DRAWN: usize = 4_000_000;
-/// Points at which a wall itself is looked at, at most: angles for [`POINTS_A_WAVE`] of its highest order, where there is room.
+/// Points at which a wall itself is evaluated, at most: angles for [`POINTS_A_WAVE`] of its highest order, where there is room.
 const POINTS_FOUND: usize = 500_000;
 
 /// Circles of a wall on common angles.

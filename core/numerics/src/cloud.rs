@@ -6,14 +6,14 @@ use std::ops::Range;
 
 use super::lanes::{NullaryFnOnce, load, vectorised};
 
-/// Points that are looked at together.
+/// Points that are evaluated together.
 const LANES: usize = 8;
 /// From so many points on, wide registers are worth a call.
 const WIDE: usize = 32;
 
 /// Points (f, w), each with the height h(s) = w − f·s over the place s in `D` dimensions.
 ///
-/// Features lie in separate columns, so that a look at all points goes through vector registers. A level that is NaN is
+/// Features lie in separate columns, so that all points are evaluated in vector registers. A level that is NaN is
 /// a point that is not there: no range has it as its lowest or highest.
 #[derive(Debug, Clone)]
 pub struct Cloud<const D: usize> {

@@ -128,12 +128,13 @@ impl Fourier {
         self.signal = own;
     }
 
-    /// The same of [`length`](Self::length) samples, which are overwritten; all harmonics are 0 with another number.
+    /// Harmonics of a turn of [`length`](Self::length) samples, which are overwritten; all harmonics are 0 with another number.
     pub fn analyse_in_place(&mut self, signal: &mut [f64], harmonics: &mut [Complex64]) {
         self.scaled(signal, harmonics, 1.0);
     }
 
-    /// The same for coefficients of e^{−inΦ}.
+    /// Harmonics of a turn as coefficients of e^{−inΦ}, of [`length`](Self::length) samples, which are overwritten; all harmonics
+    /// are 0 with another number.
     pub fn analyse_reversed_in_place(&mut self, signal: &mut [f64], harmonics: &mut [Complex64]) {
         self.scaled(signal, harmonics, -1.0);
     }
@@ -165,7 +166,8 @@ impl Fourier {
         &self.signal
     }
 
-    /// The same into `signal`, which becomes a turn long.
+    /// Writes one turn of the signal that has these harmonics from order 0 to `signal`, which becomes a turn long; orders above
+    /// Nyquist must not occur.
     pub fn synthesise_into(&mut self, harmonics: impl IntoIterator<Item = Complex64>, signal: &mut Vec<f64>) {
         let length = self.inverse.len();
         let mut filled = 0;

@@ -77,7 +77,7 @@ impl<'a> HeightMap<'a> {
         Self::new(heights_um, angles, dx_mm, step, true)
     }
 
-    /// The same grid with other heights; as many of them are taken as it has, missing ones are NaN.
+    /// A map on this grid with other heights; as many of them are taken as it has, missing ones are NaN.
     #[must_use]
     pub fn with(&self, mut heights_um: Vec<f64>) -> HeightMap<'static> {
         heights_um.resize(self.heights_um.len(), f64::NAN);

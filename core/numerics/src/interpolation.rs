@@ -6,7 +6,7 @@ use crate::Complex64;
 
 /// Values on both sides through which a polynomial goes.
 const THROUGH: usize = 16;
-/// The same as a power.
+/// [`THROUGH`] as an exponent.
 const POWER: i32 = 16;
 /// The polynomial serves where it errs by less than this share of the curve's amplitudes; its second derivative then errs by
 /// some ten times that of theirs.
@@ -87,7 +87,7 @@ impl<'a> Curve<'a> {
         let mut wave = Complex64::ONE;
         let mut sums = [0.0; 3];
         for (order, harmonic) in self.series.iter().enumerate() {
-            // Rounding of the product's powers is taken back now and then.
+            // Rounding of the product's powers is corrected now and then.
             if order % 64 == 0 {
                 wave = Complex64::cis(order as f64 * angle);
             }

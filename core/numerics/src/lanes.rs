@@ -27,7 +27,7 @@ pub fn in_lanes(channels: usize, work: &mut impl LaneWork) {
     vectorised(Calling(Groups { channels, work }, PhantomData::<Separate>));
 }
 
-/// The same with products and sums as [`fused`] takes them.
+/// Does the work for all channels, in groups of at most 8, with products and sums as [`fused`] takes them.
 pub fn in_lanes_fused(channels: usize, work: &mut impl LaneWork) {
     fused(Groups { channels, work });
 }

@@ -15,7 +15,7 @@ pub fn significant(value: f64, digits: usize) -> String {
     format!("{value:.decimals$}")
 }
 
-/// The same with its sign.
+/// `value` with so many significant digits and its sign, also where that is +.
 #[must_use]
 pub fn signed(value: f64, digits: usize) -> String {
     let sign = if value > 0.0 { "+" } else { "" };

@@ -219,7 +219,7 @@ fn remove_stale(folder: &Path, name: &str) {
 /// Gives finished files their names: all of them, or none. Their contents are synced before, the folders after it.
 ///
 /// # Errors
-/// When the file system refuses a rename; those before it are taken back.
+/// When the file system refuses a rename; those before it are undone.
 pub fn commit_all(files: Vec<PendingFile>) -> Result<Vec<PathBuf>> {
     commit(files, sync_each, publication::publish)
 }
@@ -229,7 +229,7 @@ pub fn commit_all(files: Vec<PendingFile>) -> Result<Vec<PathBuf>> {
 /// incomplete.
 ///
 /// # Errors
-/// When the file system refuses a rename; those before it are taken back.
+/// When the file system refuses a rename; those before it are undone.
 pub fn commit_last_after_others(files: Vec<PendingFile>) -> Result<Vec<PathBuf>> {
     let sync = |files: &[PendingFile]| match durable::all_in(files.iter().map(|file| folder_of(&file.temporary))) {
         Ok(true) => Ok(()),

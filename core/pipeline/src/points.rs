@@ -20,7 +20,7 @@ pub struct Points {
     pub input: PathBuf,
     /// Further files behind them.
     pub besides: Vec<PathBuf>,
-    /// The same files as they were when they were first opened, where the loader remembers them.
+    /// These files as they were when they were first opened, where the loader remembers them.
     pub opened: Vec<InputFile>,
     /// Columns of equal length; the unit is part of the name (`angle_deg`).
     pub columns: Vec<Column>,
@@ -86,7 +86,7 @@ impl PointColumn {
         Self { name, unit, about, kind, optional: true, measured: false }
     }
 
-    /// The same as a column of readings.
+    /// Marks the column as one of readings.
     #[must_use]
     pub const fn measured(self) -> Self {
         Self { measured: true, ..self }

@@ -101,7 +101,7 @@ pub struct Drawn {
     share: f64,
 }
 
-/// Draws `pairs` errors (`next` fills as many as the form has points) and looks at the form with and without each of them
+/// Draws `pairs` errors (`next` fills as many as the form has points) and evaluates the form with and without each of them
 /// added; `look` gives the same values of both of two forms.
 pub fn in_pairs(
     form_um: &[f64],
@@ -133,7 +133,7 @@ pub fn in_pairs(
 }
 
 impl Drawn {
-    /// The same where values are taken from what a filter leaves of the form: value number `rms` is its root mean square, and
+    /// The draws where values are taken from what a filter leaves of the form: value number `rms` is its root mean square, and
     /// errors raise its square by their own.
     #[must_use]
     pub fn behind_filter(mut self, rms: usize) -> Self {

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use runout_numerics::interpolation::Curve;
 
 const MOST_NEWTON: usize = 8;
-/// Extremes between angles are looked at where the parabola through three angles brings them within this many times the
+/// Extremes between angles are evaluated where the parabola through three angles brings them within this many times the
 /// largest rise between angles of the highest (lowest) one; at 16 angles a wave the parabola's own rise is good to a few percent.
 const MARGIN: f64 = 0.5;
 

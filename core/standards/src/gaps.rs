@@ -23,7 +23,7 @@ impl Gaps {
         self.stretches.iter().copied()
     }
 
-    /// The same, each stretch longer by so much at both ends, and shorter than a circle.
+    /// The gaps, each longer by `by_rad` at both ends, and shorter than a circle.
     #[must_use]
     pub fn widened(&self, by_rad: f64) -> Self {
         let mut wider = Self::default();
@@ -82,7 +82,7 @@ impl Gaps {
         }
     }
 
-    /// The same on a circle whose angle is `origin_rad` where this one's is 0, running forwards or (−1) backwards.
+    /// The gaps on a circle whose angle is `origin_rad` where this one's is 0, running forwards or (−1) backwards.
     #[must_use]
     pub fn seen_from(&self, origin_rad: f64, direction: f64) -> Self {
         let mut seen = Self::default();

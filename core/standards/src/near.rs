@@ -1,16 +1,16 @@
-//! Profiles and walls whose errors are drawn again and again: only points that may come to touch are looked at.
+//! Profiles and walls whose errors are drawn again and again: only points that may come to touch are evaluated.
 //!
 //! Between points and the same points with errors of at most e, about references whose centres are c apart, no deviation
 //! changes by more than e + |c|. A reference through the points that were near the ends before is therefore that of all points
-//! where the others were further away than that; where they were not, all have to be looked at.
+//! where the others were further away than that; where they were not, all have to be evaluated.
 
 #![allow(clippy::inline_always, reason = "see runout_numerics::lanes")]
 
 use runout_numerics::lanes::{NullaryFnOnce, load, vectorised};
 
-/// Points within this many times the usual largest error of the ends are looked at.
+/// Points within this many times the usual largest error of the ends are evaluated.
 const MARGIN: f64 = 4.0;
-/// Points that are looked at together: as many as fill two wide registers, which do not wait for each other.
+/// Points that are evaluated together: as many as fill two wide registers, which do not wait for each other.
 const LANES: usize = 16;
 
 /// The points that may come to touch.

@@ -11,7 +11,7 @@ pub struct Axis {
     pub z_mm: f64,
     /// The axis there, from the axis of angles.
     pub x_um: f64,
-    /// The same along y.
+    /// Place of the axis along y at `z_mm`, from the axis of angles, in µm.
     pub y_um: f64,
     /// dx/dz, in µrad (1000 µrad are 1 µm/mm).
     pub slope_x_urad: f64,

@@ -9,7 +9,7 @@ use runout_numerics::{
     interpolation::Curve,
 };
 
-/// Angles a wave of the highest order at which the slope is looked at first.
+/// Angles a wave of the highest order at which the slope is evaluated first.
 const POINTS_A_WAVE: usize = 16;
 /// Peaks nearer to the largest than this share of it are refined: the largest slope between two of those angles exceeds both by
 /// less, 1 − cos(π/16).

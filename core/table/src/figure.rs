@@ -28,7 +28,7 @@ pub struct Figure {
     /// Places along the horizontal axis that all panels name.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub named: Vec<(f64, String)>,
-    /// Name of a table of [reference circles](crate::circles) about which the curves of a polar figure can be looked at; its rows have the
+    /// Name of a table of [reference circles](crate::circles) about which the curves of a polar figure can be drawn; its rows have the
     /// same columns of names.
     #[serde(default)]
     pub circles: Option<String>,
@@ -135,25 +135,25 @@ impl Measure {
         Self { column: column.into(), std: None, symbol: None, marks: None, common: false }
     }
 
-    /// The same with a column of standard uncertainties.
+    /// Adds a column of standard uncertainties.
     #[must_use]
     pub fn with_std(self, column: impl Into<String>) -> Self {
         Self { std: Some(column.into()), ..self }
     }
 
-    /// The same with a symbol.
+    /// Sets the symbol of the values.
     #[must_use]
     pub fn with_symbol(self, symbol: impl Into<String>) -> Self {
         Self { symbol: Some(symbol.into()), ..self }
     }
 
-    /// The same with a column of texts that mark values.
+    /// Adds a column of texts that mark values.
     #[must_use]
     pub fn with_marks(self, column: impl Into<String>) -> Self {
         Self { marks: Some(column.into()), ..self }
     }
 
-    /// The same for values that all curves of a panel share.
+    /// Marks the values as those that all curves of a panel share.
     #[must_use]
     pub fn common(self) -> Self {
         Self { common: true, ..self }
@@ -256,43 +256,43 @@ impl Figure {
         Self::new(id, title, Drawing::Vectors { place, vector })
     }
 
-    /// The same with a panel for each combination of names in these columns.
+    /// Draws a panel for each combination of names in these columns.
     #[must_use]
     pub fn panels<T: Into<String>>(self, columns: impl IntoIterator<Item = T>) -> Self {
         Self { panels: columns.into_iter().map(Into::into).collect(), ..self }
     }
 
-    /// The same with a panel for each quantity that these columns name, of which none is left out.
+    /// Draws a panel for each quantity that these columns name, of which none is left out.
     #[must_use]
     pub fn quantities<T: Into<String>>(self, columns: impl IntoIterator<Item = T>) -> Self {
         Self { every_panel: true, ..self.panels(columns) }
     }
 
-    /// The same with a curve for each combination of names in these columns.
+    /// Draws a curve for each combination of names in these columns.
     #[must_use]
     pub fn curves<T: Into<String>>(self, columns: impl IntoIterator<Item = T>) -> Self {
         Self { curves: columns.into_iter().map(Into::into).collect(), ..self }
     }
 
-    /// The same of the rows with one of these names in a column.
+    /// Draws only the rows with one of these names in a column.
     #[must_use]
     pub fn only<T: Into<String>>(self, column: impl Into<String>, names: impl IntoIterator<Item = T>) -> Self {
         Self { only: Some((column.into(), names.into_iter().map(Into::into).collect())), ..self }
     }
 
-    /// The same with the names of the places along the horizontal axis in a column.
+    /// Takes the names of the places along the horizontal axis from a column.
     #[must_use]
     pub fn places(self, column: impl Into<String>) -> Self {
         Self { places: Some(column.into()), ..self }
     }
 
-    /// The same with a limit.
+    /// Sets a limit with its name.
     #[must_use]
     pub fn level(self, name: impl Into<String>, value: f64) -> Self {
         Self { level: Some(Level { name: name.into(), value }), ..self }
     }
 
-    /// The same with names at places along the horizontal axis.
+    /// Sets names at places along the horizontal axis.
     #[must_use]
     pub fn named(self, places: impl IntoIterator<Item = (f64, String)>) -> Self {
         Self { named: places.into_iter().collect(), ..self }
@@ -303,7 +303,7 @@ impl Figure {
         self.lines.push(Line { name: name.into(), points });
     }
 
-    /// The same with the reference circles in a table.
+    /// Draws the reference circles of a table.
     #[must_use]
     pub fn circles(self, table: impl Into<String>) -> Self {
         Self { circles: Some(table.into()), ..self }

@@ -99,13 +99,13 @@ impl ColumnSpec {
         Self::new(Kind::Flag, name, "", about)
     }
 
-    /// The same with cells that may be null.
+    /// Allows cells that are null.
     #[must_use]
     pub fn or_null(self) -> Self {
         Self { nullable: true, ..self }
     }
 
-    /// The same with numbers that repeat from row to row or follow a rule, and compress.
+    /// Marks the column as one of numbers that repeat from row to row or follow a rule, and compress.
     #[must_use]
     pub fn repeating(self) -> Self {
         Self { measured: false, ..self }
@@ -147,13 +147,13 @@ impl TableSpec {
         Self { name: name.into(), about: about.into(), columns, optional: false, figures: Vec::new() }
     }
 
-    /// The same as one that a result may lack.
+    /// Marks the table as one that a result may lack.
     #[must_use]
     pub fn optional(self) -> Self {
         Self { optional: true, ..self }
     }
 
-    /// The same with a figure.
+    /// Adds a figure.
     #[must_use]
     pub fn figure(mut self, figure: Figure) -> Self {
         self.figures.push(figure);

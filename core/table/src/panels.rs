@@ -113,7 +113,7 @@ pub struct Curve {
     pub marks: Vec<Mark>,
     /// Whether it is a line where others are points.
     pub joined: bool,
-    /// Reference circles about which it can be looked at.
+    /// Reference circles about which it can be drawn.
     pub circles: Vec<Circle>,
     /// Of vectors, each with its place; then [`points`](Self::points) are the places.
     pub arrows: Vec<Arrow>,

@@ -23,7 +23,8 @@ pub fn counted<'a>(input: Box<dyn SampleStream + 'a>, phase: &PhaseCourse) -> Bo
     Box::new(Counted { input, capture, phase: *phase, broken, first_rev: None })
 }
 
-/// The same for a part that turns so many times from one mark to the next; the stream itself where that is once.
+/// A stream whose marks are one turn of the part apart, for a part that turns so many times from one mark to the next; the stream
+/// itself where that is once.
 #[must_use]
 #[allow(clippy::float_cmp, reason = "1 as it was written")]
 pub fn declared<'a>(input: Box<dyn SampleStream + 'a>, turns_per_mark: f64) -> Box<dyn SampleStream + 'a> {

@@ -37,7 +37,7 @@ const DETERMINED: f64 = 3.0;
 /// in an averaged turn is (last level − first level)/turns, and not the slope of a line through a wave.
 const BORNE_OUT: f64 = 0.5;
 
-/// Levels that are looked at in a capture: of more turns, means over several are.
+/// Levels that are evaluated in a capture: of more turns, means over several are.
 const MOST_LEVELS: usize = 128;
 
 /// Mean levels of one sensor's turns in one capture.
@@ -161,7 +161,7 @@ struct Sensor {
     alike: f64,
     /// Observations that all levels together count as.
     observations: f64,
-    /// The same of one capture.
+    /// Observations that the levels of one capture count as.
     of_capture: f64,
 }
 

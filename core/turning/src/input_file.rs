@@ -140,7 +140,7 @@ fn opening(path: &Path, error: io::Error) -> Error {
 /// # Errors
 /// When it cannot be opened, or is a folder, a pipe, a device or a socket.
 pub fn open_regular(path: &Path) -> io::Result<File> {
-    // A pipe waits for a writer when it is opened: it is looked at before.
+    // A pipe waits for a writer when it is opened: it is examined before.
     regular(&std::fs::metadata(path)?)?;
     let file = File::open(path)?;
     regular(&file.metadata()?)?;

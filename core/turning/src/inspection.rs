@@ -1,4 +1,4 @@
-//! A look at every sample before anything else touches it: what is not a number, clipped or dead is found here.
+//! Every sample is examined before any other use: what is not a number, clipped or dead is found here.
 //!
 //! - A value that is not finite is replaced by the channel's last good one (0 before the first), so that recursive
 //!   filters stay finite, and marked as [`DefectKind::NotFinite`](crate::measurement::DefectKind::NotFinite); so is one beyond [`FARTHEST_UM`], as
@@ -47,7 +47,7 @@ pub const WRAPPED_SHARE: f64 = 0.75;
 pub const FLAT_RUN: f64 = 8.0;
 /// Shortest flat run, in turns.
 pub const FLAT_RUN_TURN: f64 = 0.02;
-/// How far before a flat run the approach to it is looked at, in turns.
+/// How far before a flat run the approach to it is examined, in turns.
 pub const APPROACH_TURN: f64 = 1.0 / 64.0;
 /// Rise over the approach, in the channel's finest steps, above which it is steep.
 pub const STEEP_STEPS: f64 = 16.0;
@@ -66,7 +66,7 @@ const CHUNK: [usize; 2] = [64, 1024];
 pub struct Inspection<'a> {
     input: Box<dyn SampleStream + 'a>,
     raw: Block,
-    /// Looked at, not handed on.
+    /// Examined, not handed on.
     held: Block,
     /// The frames before those held, for the approach to a run.
     past: Vec<f64>,
@@ -77,7 +77,7 @@ pub struct Inspection<'a> {
     /// Frames that are looked over at once.
     chunk: usize,
     ended: bool,
-    /// Channels whose readings stand for several samples, once the first frames were looked at.
+    /// Channels whose readings stand for several samples, once the first frames were examined.
     several: Option<Vec<HeldChannel>>,
     report: Option<Box<dyn FnOnce(UnusualReadings) + Send + 'a>>,
 }
@@ -120,7 +120,7 @@ impl<'a> Inspection<'a> {
         Self { input, raw, held, past, channels, rule, stuck, chunk, ended: false, several: None, report: None }
     }
 
-    /// Looks at the block in `raw` and joins it to those held.
+    /// Examines the block in `raw` and joins it to those held.
     fn take(&mut self) {
         let count = self.channels.len();
         if self.held.samples.is_empty() {

@@ -22,7 +22,7 @@ pub trait Recording: Send + Sync {
     /// When the capture is missing or cannot be read.
     fn open(&self, station: usize, setup: usize) -> Result<Box<dyn SampleStream + '_>>;
 
-    /// The same, where so many threads may work on it.
+    /// Opens the samples of one station in one setup, where so many threads may work on it.
     ///
     /// # Errors
     /// When the capture is missing or cannot be read.
@@ -33,7 +33,7 @@ pub trait Recording: Send + Sync {
     /// The files behind it, for their checksums.
     fn inputs(&self) -> Vec<PathBuf>;
 
-    /// The same files as they were when they were first opened; as they are now where a recording does not remember them.
+    /// The files behind it as they were when they were first opened; as they are now where a recording does not remember them.
     ///
     /// # Errors
     /// When one cannot be read.

@@ -17,7 +17,7 @@ const STEPS: usize = 9;
 /// with two or more.
 const EXPLAINED: [f64; 2] = [0.97, 0.92];
 
-/// Highest order looked at: above, spectra are smooth, and noise has more orders to look like a tone.
+/// Highest order evaluated: above, spectra are smooth, and noise has more orders to look like a tone.
 const HIGHEST: usize = 100;
 
 /// A tone near a whole order.

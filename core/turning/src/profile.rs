@@ -45,7 +45,7 @@ pub struct Profile {
     pub course: TurnCourse,
     /// What its marks were put right by, where they do not count the part's turns.
     pub recounted: Option<Recounted>,
-    /// The same turns in parts, where asked for.
+    /// The turns used, in parts, where asked for.
     pub split: Option<Split>,
     /// How far the turns lie apart, where asked for and there are two.
     pub spread: Option<Spread>,
@@ -156,7 +156,7 @@ pub struct Part {
     pub mean: Vec<Complex64>,
     /// Covariance of that mean.
     pub covariance: Option<Vec<Complex64>>,
-    /// The same with independent turns.
+    /// Covariance of that mean if turns were independent.
     pub scatter: Option<Vec<Complex64>>,
     /// What that covariance is taken from; nothing below three turns.
     pub neighbours: Option<Neighbours>,
@@ -253,17 +253,18 @@ impl Profile {
 pub const NEIGHBOURS: usize = 2;
 
 /// Replaces the covariance of each order, `[order][entry]` with `size` entries, by the mean over its neighbours. Order 1
-/// stays by itself: what shakes the eccentricity shakes no other order.
+/// is not pooled with the others: a disturbance of the eccentricity affects order 1 only.
 pub fn smooth(covariance: &mut [Complex64], size: usize) {
     smooth_over(covariance, size, |order, max_order| {
         order.saturating_sub(SMOOTHING).max(2)..=(order + SMOOTHING).min(max_order)
     });
 }
 
-/// The same over [`orders_beside`] to each side: what the variance of a result is taken from.
+/// Replaces the covariance of each order, `[order][entry]` with `size` entries, by the mean over [`orders_beside`] to each side:
+/// what the variance of a result is taken from.
 ///
 /// At low orders the density of asynchronous motion differs from order to order, by slow motion and by single tones:
-/// there an order is looked at by itself.
+/// there an order is evaluated by itself.
 pub fn smooth_by_order(covariance: &mut [Complex64], size: usize) {
     smooth_over(covariance, size, |order, max_order| {
         let beside = orders_beside(order);
@@ -366,7 +367,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn low_orders_are_looked_at_by_themselves() {
+    fn low_orders_are_evaluated_by_themselves() {
         // A line at order 2 of a spectrum that is 1 elsewhere.
         let mut covariance: Vec<Complex64> =
             (0..20).map(|order| Complex64::from(if order == 2 { 61.0 } else { 1.0 })).collect();

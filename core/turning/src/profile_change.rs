@@ -39,8 +39,8 @@ impl ProfileChange {
 }
 
 impl Profile {
-    /// The same with each harmonic changed; covariances, parts and single turns follow to first order. What is kept of the motion of single turns
-    /// ([`Profile::spread`]) stays as it was measured.
+    /// The profile with each harmonic changed; covariances, parts and single turns follow to first order. What is kept of the
+    /// motion of single turns ([`Profile::spread`]) stays as it was measured.
     ///
     /// # Panics
     /// Where the change has fewer numbers than the mean.

@@ -17,10 +17,10 @@ pub struct Residual {
     /// Lowest and highest order at which a reading is redundant; `None` where the fit is not one of single orders, and where
     /// none is.
     pub orders: Option<[usize; 2]>,
-    /// What is left at each redundant order, beside what noise leaves; none where the fit is not one of single orders, and where the
+    /// The residual at each redundant order, beside what noise leaves; none where the fit is not one of single orders, and where the
     /// noise is not known.
     pub by_order: Vec<OrderResidual>,
-    /// What is left of each reading at the redundant orders; none where the fit is not one of single orders.
+    /// The residual of each reading at the redundant orders; none where the fit is not one of single orders.
     pub by_reading: Vec<ReadingResidual>,
     /// The tests of the readings on themselves.
     pub checks: Vec<Check>,

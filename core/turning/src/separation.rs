@@ -109,8 +109,8 @@ pub struct Separation {
     /// Covariance E[δ δᴴ] of the forms among `unknowns`, `[order][form][form]` from order 0: sections of a station
     /// share the errors of its motion. What is not observable means nothing. `None` where it is not known.
     pub form_covariance: Option<Vec<Complex64>>,
-    /// Real degrees of freedom behind `variance` at an order that was looked at by itself, or of the readings that all orders have it from; 0 where it
-    /// is taken as exact. [`degrees_of_freedom`](Self::degrees_of_freedom) gives those of any order.
+    /// Real degrees of freedom behind `variance` at an order that was evaluated by itself, or of the readings that all orders have it from; 0 where
+    /// it is taken as exact. [`degrees_of_freedom`](Self::degrees_of_freedom) gives those of any order.
     pub freedom: usize,
     /// Which orders share them.
     pub variance_from: VarianceFrom,
@@ -152,7 +152,7 @@ pub struct SectionAt {
     pub z_mm: f64,
     /// Where nothing is known of it: a keyway, a stretch without readings. Every value leaves these out.
     pub gaps: Gaps,
-    /// The same as the rig declares them: `gaps` are longer by what marks and edges leave open.
+    /// The gaps as the rig declares them: `gaps` are longer by what marks and edges leave open.
     pub declared_gaps: Gaps,
     /// Share of its readings that the form was computed from.
     pub used: f64,
@@ -232,7 +232,7 @@ impl Separation {
         (0..=self.max_order()).map(|order| student_95(self.degrees_of_freedom(order) as f64) / NORMAL_95).collect()
     }
 
-    /// The same estimates as if the data decided for them, and for each of the equivalents.
+    /// The estimates as if the data decided for them, and those of each equivalent.
     #[must_use]
     pub fn decided(&self) -> (Self, Vec<Self>) {
         let own = Self { equivalents: Vec::new(), ..self.clone() };

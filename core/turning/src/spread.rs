@@ -85,7 +85,7 @@ pub struct Projection {
 }
 
 impl Projection {
-    /// The same, and what it gives along these lines (and of tilt towards them) where x and y are both there.
+    /// Adds the motion along these lines (and the tilt towards them), where x and y are both there.
     #[must_use]
     pub fn with_lines(mut self, lines: &[Azimuth]) -> Self {
         for line in lines {
@@ -112,7 +112,7 @@ impl Projection {
         self
     }
 
-    /// The same, and what it gives along the axis at these places of the face, where it gives z and the tilts towards them.
+    /// Adds the motion along the axis at these places of the face, where z and the tilts towards them are there.
     #[must_use]
     pub fn with_faces(mut self, places: &[FacePlace]) -> Self {
         let line = self.rows.iter().find_map(|(quantity, _)| quantity.azimuth());

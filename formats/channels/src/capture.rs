@@ -210,7 +210,7 @@ impl Place<'_> {
         let stated_hz = self.config.sample_rate_hz;
         let mut clocks = Vec::new();
         for signal in sensors {
-            // A time column takes a look at each sample: only where it is named, or nothing else says the rate.
+            // A time column takes a check of each sample: only where it is named, or nothing else says the rate.
             let mut clock = match stated_hz {
                 Some(_) if self.config.time.is_none() => Clock::stated(signal.channel(), 0.0),
                 _ => self.clock(signal, &mut scans)?,

@@ -44,7 +44,7 @@ pub const FORMATS: [Format; 10] = [
 
 /// The format without a signature.
 pub(crate) const TEXT: &str = text::FORMAT.name;
-/// First bytes that formats look at.
+/// First bytes that formats examine.
 const HEAD: u64 = 4096;
 
 /// The format of a file, by its name or by the file's first bytes.

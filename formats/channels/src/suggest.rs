@@ -20,9 +20,9 @@ use crate::{
 
 /// Readings that are shown of each channel.
 const SHOWN: usize = 5;
-/// Samples of a channel that are looked at for marks.
+/// Samples of a channel that are examined for marks.
 const LOOKED_AT: usize = 1 << 18;
-/// Channels whose samples are looked at.
+/// Channels whose samples are examined.
 const MOST_CHANNELS: usize = 256;
 /// Share of samples that are low or high in a trace of pulses.
 const PULSES: f64 = 0.9;
@@ -42,7 +42,7 @@ pub struct ChannelsReport {
     pub mark: Option<String>,
     /// A `[load]` table to start from.
     pub load: String,
-    /// The same, part by part.
+    /// The parts of that `[load]` table.
     #[serde(skip)]
     pub suggestion: Suggestion,
     /// What a reader should know of the file.
@@ -59,7 +59,7 @@ pub struct ChannelReport {
     pub first: Vec<f64>,
 }
 
-/// How a channel tells the angle.
+/// How a channel gives the angle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Turning {
     Pulses { threshold: f64, hysteresis: f64 },
@@ -81,7 +81,7 @@ pub struct Suggestion {
 }
 
 impl Suggestion {
-    /// The same for a rig's own setups and sensors, in their order; what the rig has no name for is a comment.
+    /// The suggestion with a rig's own setups and sensors, in their order; what the rig has no name for becomes a comment.
     #[must_use]
     pub fn for_rig(mut self, setups: &[&str], sensors: &[&str]) -> Self {
         let mut comments = String::new();
@@ -175,7 +175,7 @@ fn is_mark(name: &str) -> bool {
         .any(|word| name.contains(word))
 }
 
-/// How a channel tells the angle, by its name's and unit's hint and its samples.
+/// How a channel gives the angle, by its name's and unit's hint and its samples.
 fn turning_of(channel: &Channel, values: &[f64]) -> Option<Turning> {
     if values.len() < 16 || values.iter().any(|value| !value.is_finite()) {
         return None;

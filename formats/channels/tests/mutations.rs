@@ -190,7 +190,7 @@ fn mutate(format: &str, files: usize) {
     );
 }
 
-/// The reference to a text of variable length in HDF5 states its length, which the library takes memory for before it looks at the text.
+/// The reference to a text of variable length in HDF5 states its length, which the library takes memory for before it examines the text.
 #[test]
 fn a_text_that_is_said_to_be_longer_than_its_file_is_left_out_at_once() {
     let folder = tempfile::tempdir().unwrap();

@@ -85,7 +85,7 @@ impl Chain {
         all
     }
 
-    /// The same without some errors.
+    /// The chain without some errors, which are named by their symbols.
     pub(crate) fn without(&self, left_out: &[String]) -> Self {
         let mut kept = self.clone();
         for axis in &mut kept.axes {

@@ -22,7 +22,7 @@ const WHOLE_POWERS: [u64; 8] = [1, 10, 100, 1000, 10_000, 100_000, 1_000_000, 10
 const EXACT_WHOLE: u64 = 1 << 53;
 
 /// Reads a plain number at the beginning of `bytes`: its value and its length, or `None` where only the slower way decides.
-/// What follows is for the caller to look at: an exponent is none of it.
+/// What follows is for the caller to examine: an exponent is none of it.
 ///
 /// Where the digits make a whole number up to 2^53 and the power of ten is at most 22, both are exact and their quotient
 /// or product is rounded once, as it should be (W. D. Clinger, How to read floating point numbers accurately, 1990).
@@ -32,13 +32,13 @@ pub(crate) fn leading(reading: impl Reading, bytes: &[u8], decimal: u8) -> Optio
     at_once.or_else(|| one_by_one(bytes, decimal))
 }
 
-/// How the characters of a number are looked at together.
+/// How the characters of a number are examined together.
 pub(crate) trait Reading: Copy {
     /// Value and length of the number at the beginning of a window; `None` where it is too long for this.
     fn at_once(self, window: &[u8; WINDOW], decimal: u8) -> Option<(f64, usize)>;
 }
 
-/// Characters that a number looked at at once is to be in, with what is behind it: two times seven digits, sign and mark.
+/// Characters that a number examined at once is to be in, with what is behind it: two times seven digits, sign and mark.
 pub(crate) const WINDOW: usize = 16;
 
 /// Eight characters at a time, in whole numbers: at most seven on either side of the decimal mark, sign included, as most
@@ -300,7 +300,7 @@ mod tests {
             assert_eq!(found.to_bits(), expected.to_bits(), "{text}: {found} {expected}");
             let found = parse_number(text.replace('.', ",").as_bytes(), b',').unwrap();
             assert_eq!(found.to_bits(), expected.to_bits(), "{text} with a comma");
-            // With more of the line behind it, eight bytes at a time can be looked at.
+            // With more of the line behind it, eight bytes at a time can be examined.
             for (found, length) in every_way(format!("{text};1.0000000").as_bytes(), b'.').into_iter().flatten() {
                 let plain = text.split(['e', 'E']).next().unwrap();
                 assert_eq!((found, length), (plain.parse().unwrap(), plain.len()), "{text} in a line");

@@ -17,7 +17,7 @@ use crate::{
     stated::Stated,
 };
 
-/// Readings of a file that are kept from the first look at it, at most: 32 MiB. A file that has more is read twice.
+/// Readings of a file that are kept from the first pass, at most: 32 MiB. A file that has more is read twice.
 const MOST_KEPT: usize = 1 << 22;
 
 /// Sampling rates that differ by a smaller share are the same: a time column's rounding.
@@ -39,7 +39,7 @@ const MARKS_AT_WHOLE_SAMPLES: &str = "marks of a column `index` are at whole sam
     setups. The stated uncertainties include it; an encoder's angle, a trace of the mark, or fractional marks (HDF5) make them smaller";
 
 impl CsvRecording {
-    /// Looks at every file's header.
+    /// Examines every file's header.
     pub(crate) fn open(rig: &Rig, stations: Vec<StationKey>, paths: &[Vec<PathBuf>], stated: Stated) -> Result<Self> {
         let mut remarks = Vec::new();
         let mut unknown: Vec<String> = Vec::new();
@@ -325,7 +325,7 @@ mod tests {
             }
             let text = lines.join("\n");
             for way in WAYS {
-                // Cells of readings are not looked at where they are not kept: that is left to the second look.
+                // Cells of readings are not examined where they are not kept: that is left to the second pass.
                 let problem = problem(&text, way);
                 let reported = problem.starts_with(&format!(", line {line}")) && problem.contains(words);
                 let later = row.ends_with('x') && problem.starts_with(&format!(", line {}", line + 12_001));

@@ -308,7 +308,7 @@ impl PlainRows<'_> {
     }
 }
 
-/// The same in wide registers. (A closure would not be inlined.)
+/// Reads plain rows in wide registers. (A closure would not be inlined.)
 #[cfg(target_arch = "x86_64")]
 struct Wide<'a>(pulp::x86::V3, PlainRows<'a>);
 

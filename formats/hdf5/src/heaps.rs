@@ -2,7 +2,7 @@
 //!
 //! Texts of any length lie in global heaps: collections of objects, one after the other (HDF5 File Format Specification 3.0, III.E).
 //! libhdf5 2.2 goes from object to object by their stated lengths, and stays at one that leads nowhere: an object 0 of length 0, or a
-//! length that overflows. So they are looked at before it reads texts; what else may be wrong with them it finds itself.
+//! length that overflows. So they are examined before it reads texts; what else may be wrong with them it finds itself.
 
 use std::{
     collections::HashSet,
@@ -20,12 +20,12 @@ const SIGNATURE: &[u8] = b"GCOL\x01\0\0\0";
 const HEADER: usize = 16;
 /// Bytes that are looked through at once.
 const PIECE: usize = 1 << 20;
-/// Most bytes of a collection that are looked at: the library makes them of 4 to 64 kB, or for one longer text. A damaged length
+/// Most bytes of a collection that are examined: the library makes them of 4 to 64 kB, or for one longer text. A damaged length
 /// is not to fill the memory.
 const LONGEST: u64 = 1 << 24;
-/// In larger files, data are passed over, which costs a look at every dataset.
+/// In larger files, data are passed over, which takes an examination of every dataset.
 const SMALL: u64 = 1 << 24;
-/// Groups in groups that data are looked for in, and objects that are looked at. What lies in others is looked through.
+/// Groups in groups that data are looked for in, and objects that are examined. What lies in others is looked through.
 const DEEPEST: usize = 6;
 const MOST_OBJECTS: usize = 20_000;
 
@@ -93,7 +93,7 @@ impl Objects {
     }
 }
 
-/// Where the numbers of all datasets lie; `None` where these are too many to be looked at.
+/// Where the numbers of all datasets lie; `None` where these are too many to be examined.
 pub(crate) fn all_data(file: &File) -> Option<Vec<Range<u64>>> {
     let (mut objects, mut found) = (Objects::default(), Vec::new());
     objects.extents(file, DEEPEST, &mut found);

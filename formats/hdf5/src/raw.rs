@@ -138,7 +138,7 @@ pub(crate) fn read_field(dataset: &Dataset, field: &str, range: Range<usize>) ->
 
 /// The longest length that the references of an attribute or a dataset to texts of variable length state, in bytes; `None` where they cannot be read.
 ///
-/// To read the texts, the library takes memory of that length, and clears it, before it looks at the texts.
+/// To read the texts, the library takes memory of that length, and clears it, before it examines the texts.
 pub(crate) fn longest_text(container: &Container) -> Option<u32> {
     static ONCE: Once = Once::new();
     let source = Datatype::from_type::<VarLenUnicode>().ok()?;

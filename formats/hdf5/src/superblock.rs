@@ -5,7 +5,7 @@ use std::io::{Read, Seek, SeekFrom};
 use runout_core::{Error, Result, input_file::InputFile};
 
 const SIGNATURE: &[u8] = b"\x89HDF\r\n\x1a\n";
-/// Bytes of a superblock that are looked at.
+/// Bytes of a superblock that are examined.
 const HEAD: usize = 64;
 /// The signature stands at 0, or at a power of two from here on.
 const FIRST: u64 = 512;

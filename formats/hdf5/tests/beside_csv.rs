@@ -1,4 +1,4 @@
-//! The same readings as HDF5 and as CSV give the same stream.
+//! Readings give the same stream as HDF5 and as CSV.
 
 use std::{fmt::Write as _, path::Path};
 

@@ -120,12 +120,12 @@ pub(crate) fn load(path: &Path, rig: &Rig) -> Result<Box<dyn Recording>> {
     load_marked(path, rig, None)
 }
 
-/// The same, with the mark as an analogue trace.
+/// Loads a file; `marker` says how its mark is an analogue trace.
 pub(crate) fn load_marked(path: &Path, rig: &Rig, marker: Option<Marker>) -> Result<Box<dyn Recording>> {
     load_as(rig, Hdf5Config { path: path.to_owned(), marker, follow_links: false })
 }
 
-/// The same, with other settings.
+/// Loads a file with these settings.
 pub(crate) fn load_as(rig: &Rig, config: Hdf5Config) -> Result<Box<dyn Recording>> {
     let context = Context { folder: Path::new(""), rig: Some(rig) };
     let loader = config.check(&context).unwrap();

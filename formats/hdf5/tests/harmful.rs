@@ -44,7 +44,7 @@ fn ways_out_of_a_file_are_refused_or_their_files_are_inputs() {
         assert!(inputs.len() == 2 && inputs[1].ends_with(source), "{name}: {inputs:?}");
         let found = read(&*recording, 0, 0).unwrap();
         assert_eq!((found.samples[0], found.samples[2], found.samples.len()), (0.0, 2.0 / 64.0, 1200), "{name}");
-        // What was followed is looked at like the file itself.
+        // What was followed is examined like the file itself.
         let other = folder.path().join(source);
         let bytes = fs::read(&other).unwrap();
         fs::write(&other, [&bytes[..], b"more"].concat()).unwrap();

@@ -20,7 +20,7 @@ const COMPRESSED: &[u8] = b"DSCOMPRESSED";
 /// Types of objects whose points are heights: profiles, surfaces, series and layers of them, surfaces with a picture.
 const HEIGHTS: [u16; 8] = [1, 2, 4, 5, 7, 8, 11, 13];
 const SURFACE_WITH_PICTURES: u16 = 16;
-/// Objects that are looked at.
+/// Objects that are examined.
 const MOST_OBJECTS: usize = 10_000;
 /// What a marked height is below the least one.
 const VOID_BELOW: f64 = 2.0;

@@ -104,7 +104,7 @@ struct CurveData {
     /// Whether it is a line where others are points.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     joined: bool,
-    /// Reference circles about which it can be looked at.
+    /// Reference circles about which it can be drawn.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     circles: Vec<CircleData>,
 }

@@ -24,8 +24,8 @@ const NM_PER_UM: f64 = 1e3;
 /// their covariances 20, −15, 6, −1 on both sides.
 const OF_THIRD_DIFFERENCES: f64 = 20.0;
 const INDEPENDENT: f64 = 400.0 / 924.0;
-/// The same of fourth differences, 1 + 16 + 36 + 16 + 1; the median of sizes of a normal variable of deviation 1; and deviations that noise does not
-/// reach.
+/// Variance of fourth differences of independent numbers, 1 + 16 + 36 + 16 + 1; the median of sizes of a normal variable of
+/// deviation 1; and deviations that noise does not reach.
 const OF_FOURTH_DIFFERENCES: f64 = 70.0;
 const MEDIAN_OF_NORMAL: f64 = 0.674_489_750_196_081_7;
 const FAR: f64 = 8.0;

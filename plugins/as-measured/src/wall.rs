@@ -8,7 +8,7 @@ use runout_cylinder::{LeastSquaresCylinder, LeastSquaresCylinderConfig};
 
 use crate::config::{AsMeasuredConfig, ORDERS, Object};
 
-/// Sections that are told apart by a gap in their heights, at most.
+/// Sections that are distinguished by a gap in their heights, at most.
 const MOST_SECTIONS: f64 = 200.0;
 /// Share of the radius that the heights of one circle may differ by.
 const LEVEL: f64 = 1e-3;

@@ -172,7 +172,7 @@ fn held(circles: u64, form_um: impl Fn(u64, f64) -> f64, noise_um: f64) -> usize
 
 /// A burr of one or two points is no noise: it is in the interval.
 #[test]
-fn intervals_hold_a_narrow_burr() {
+fn intervals_cover_a_narrow_burr() {
     let form = |seed: u64, angle: f64| {
         let aside = (angle - TAU * (100.0 + seed as f64) / 720.0) / 0.3_f64.to_radians();
         0.25 * (2.0 * angle + 0.4).cos() + 0.2 * (3.0 * angle).cos() + 1.5 * (-0.5 * aside * aside).exp()
@@ -183,7 +183,7 @@ fn intervals_hold_a_narrow_burr() {
 
 /// Few points beyond the harmonics show the noise of all of them: it is then found too small or too large in all orders alike.
 #[test]
-fn intervals_hold_equal_lobes_in_noise_that_few_points_show() {
+fn intervals_cover_equal_lobes_in_noise_that_few_points_show() {
     let circles = if std::env::var_os("RUNOUT_TRIALS").is_some_and(|value| value == "full") { 400 } else { 40 };
     for (lobes, noise_um) in [(3.0, 0.1), (5.0, 0.3)] {
         let held = held(circles, |_, angle| (lobes * angle).cos(), noise_um);

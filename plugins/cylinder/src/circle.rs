@@ -201,7 +201,7 @@ impl Cleaned {
         Self::beginning_with(vec![true; scan.len()], scan, max_order, about_mm, deviations)
     }
 
-    /// The same from points that are kept at first.
+    /// Sets aside points as [`of`](Self::of) does, beginning with the points in `kept`.
     ///
     /// # Errors
     /// What hinders the fit, in words.
@@ -227,7 +227,7 @@ impl Cleaned {
         Err("its outliers never settle".into())
     }
 
-    /// The same for some consecutive points.
+    /// The result for some consecutive points.
     #[must_use]
     pub(crate) fn range(self, start: usize, count: usize) -> Self {
         let kept = self.kept.into_iter().skip(start).take(count).collect();
@@ -256,7 +256,7 @@ impl Cleaned {
         arcs
     }
 
-    /// The same as angles in degrees: from, to, how many.
+    /// Arcs that points were left out of, as angles in degrees: from, to, how many.
     #[must_use]
     pub(crate) fn stretches(&self, scan: &Scan) -> Vec<(f64, f64, usize)> {
         let degrees = |point: usize| scan.angle_rad[point].to_degrees();

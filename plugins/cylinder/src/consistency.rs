@@ -69,7 +69,7 @@ pub(crate) fn unlike(scan: &Scan, basis: &Basis, measured: &Scan, name: &str) ->
     Some(rows::unlike(&left, basis.columns())?.check(&declared, "µm"))
 }
 
-/// Why what is left beyond the harmonics of a circle does not show the noise within them: behind a low-pass, noise has less power at higher orders.
+/// Why the residual beyond the harmonics of a circle does not show the noise within them: behind a low-pass, noise has less power at higher orders.
 pub(crate) fn hidden_noise(scan: &Scan, basis: &Basis) -> Option<String> {
     let mut left = scan.deviation_um.clone();
     basis.remove_from(&mut left);
@@ -100,7 +100,7 @@ pub(crate) fn hidden_noise(scan: &Scan, basis: &Basis) -> Option<String> {
         return None;
     }
     hidden(format!(
-        "what is left at orders {from} to {middle} has {} times the size of that at {middle} to {to}, where noise has the same",
+        "the residual at orders {from} to {middle} has {} times the size of that at {middle} to {to}, where noise has the same",
         significant((lower / upper).sqrt(), 2)
     ))
 }

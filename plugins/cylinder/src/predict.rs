@@ -22,7 +22,7 @@ pub struct Prediction {
     pub outliers: usize,
     /// Root mean square of measured minus predicted without the outliers, in µm; NaN without points.
     pub rms_um: f64,
-    /// The same with every point.
+    /// Root mean square of measured minus predicted with every point, in µm; NaN without points.
     pub rms_all_um: f64,
     /// What the cylinder alone, a surface without form, leaves of the points behind [`rms_um`](Self::rms_um), in µm.
     pub cylinder_rms_um: f64,

@@ -62,7 +62,7 @@ impl Scan {
         some
     }
 
-    /// The same points with their deviation counted from `from` (angle in rad, z in mm).
+    /// The points with their deviation counted from `from` (angle in rad, z in mm).
     pub(crate) fn less(&self, from: impl Fn(f64, f64) -> f64) -> Self {
         let deviation_um = self.iter().map(|(angle, z, deviation)| deviation - from(angle, z)).collect();
         Self { deviation_um, ..self.clone() }

@@ -19,7 +19,7 @@ pub struct Cylinder {
     pub radius_offset_um: f64,
     /// Where its axis passes [`z_mm`](Self::z_mm), in µm.
     pub x_um: f64,
-    /// The same along y.
+    /// Place of its axis along y at [`z_mm`](Self::z_mm), in µm.
     pub y_um: f64,
     /// Slope of the axis dx/dz, in µm per mm; 0 where the tilt is not observable.
     pub slope_x_um_per_mm: f64,

@@ -60,7 +60,7 @@ struct ExternalExport {
 }
 
 impl ExternalExport {
-    /// Tells the names of the files, and the paths to write them to.
+    /// Sends the names of the files, and the paths to write them to.
     fn announce(&self, names: &[String]) -> Result<()> {
         let columns =
             [("name", "name of a file"), ("path", "where to write it: it gets its name when the run is complete")];

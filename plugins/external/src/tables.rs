@@ -57,7 +57,7 @@ impl Table {
         let name = &frame.name;
         let no_stream = |error: String| format!("gave a table `{name}` that is no Arrow IPC stream: {error}");
         uncompressed(&frame.body).map_err(no_stream)?;
-        // A library that reads what a stranger wrote may panic.
+        // A library that reads what another program wrote may panic.
         let read = catch_unwind(AssertUnwindSafe(|| -> Result<_, ArrowError> {
             let reader = StreamReader::try_new(&frame.body[..], None)?;
             let schema = reader.schema();

@@ -143,7 +143,7 @@ fn a_plate_without_noise_has_its_heights() {
 }
 
 #[test]
-fn intervals_hold_the_truth() {
+fn intervals_cover_the_true_value() {
     let (truth, plates) = (truth(), trials(150));
     for (noise_urad, is_stated) in [(0.2, true), (0.2, false), (3.0, true), (3.0, false)] {
         let mut held = [0; 5];
@@ -162,7 +162,7 @@ fn intervals_hold_the_truth() {
 
 /// A plate that is fifty times as flat as the other: what is found is noise, which may have hidden as much.
 #[test]
-fn intervals_of_a_flat_plate_hold_the_truth() {
+fn intervals_of_a_flat_plate_cover_the_true_value() {
     let (mut held, plates) = ([0; 5], trials(150));
     for seed in 0..plates as u64 {
         let [mut flat, sound] = [3.0, 0.0].map(|noise_urad| Rows::of(&LINES, noise_urad, 0.0, seed));

@@ -18,9 +18,9 @@ use crate::{
     strangers::{self, Stranger},
 };
 
-/// How often strangers are looked for, taken out, and the loop run again.
+/// How often unmodelled disturbances are looked for, taken out, and the loop run again.
 const ROUNDS: usize = 3;
-/// Strangers that are listed.
+/// Unmodelled disturbances that are listed.
 const LISTED: usize = 5;
 /// Key values before and after.
 const LOOKED_AT: [&str; 3] = ["Sq", "Sz", "Sa"];
@@ -86,8 +86,8 @@ impl FlyCutting {
             diagnosis.warnings.push(format!(
                 "{}: {left_out} points are left out of the fit, and are part of all values",
                 match strangers.len() {
-                    1 => "what is left in one place is no effect of the cut".to_owned(),
-                    count => format!("what is left in {count} places is no effect of the cut"),
+                    1 => "the residual in one place is no effect of the cut".to_owned(),
+                    count => format!("the residual in {count} places is no effect of the cut"),
                 }
             ));
         }

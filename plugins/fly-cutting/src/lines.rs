@@ -25,7 +25,7 @@ const LINEAR: f64 = 0.2;
 /// Lines of which the phase of the scallops is fitted anew.
 const PHASED: usize = 12;
 
-/// The same settings with a line at another ratio.
+/// Settings with a line at another ratio.
 pub(crate) struct OtherRatio {
     pub ratio: f64,
     /// By how much χ² promises to be worse.

@@ -8,11 +8,11 @@ use runout_core::{
 
 use crate::{heights::Heights, model::CutModel, separate::FlyCutting};
 
-/// Mistakes are looked for where the cut explains less than half of the square of what is left beside a plane.
+/// Mistakes are looked for where the cut explains less than half of the square of the residual of a plane.
 const FAR: f64 = 0.7;
 /// And said where the correction leaves less than this share of it.
 const SHARE: f64 = 0.5;
-/// Points that are looked at.
+/// Points that are evaluated.
 const LOOKED_AT: usize = 40_000;
 /// Units by which heights or places are exchanged.
 const UNITS: [(f64, &str); 4] = [

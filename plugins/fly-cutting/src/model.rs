@@ -28,7 +28,7 @@ use crate::{
 
 /// Other ratios of a line that are tried where another effect was found beside it.
 const ELSEWHERE: usize = 6;
-/// Points that the search looks at, and those of the final fit.
+/// Points that the search evaluates, and those of the final fit.
 const SEARCHED: usize = 160_000;
 const FITTED: usize = 640_000;
 /// Points by which the phase of the scallops is found.
@@ -37,7 +37,7 @@ const SAMPLED: usize = 4_000;
 const HELD_OUT: usize = 5;
 /// A nose radius of less than this share of the declared one, or of more than its inverse, is none.
 const LEAST_RADIUS: f64 = 0.1;
-/// Angles of a map in µrad, and changes of the cutter's radius as a share of it, that are looked at.
+/// Angles of a map in µrad, and changes of the cutter's radius as a share of it, that are evaluated.
 const ROTATIONS_URAD: f64 = 3e4;
 const CUTTERS: f64 = 0.2;
 

@@ -37,7 +37,7 @@ pub(crate) fn tables() -> Vec<TableSpec> {
                 "Surface without the effects found (of a run: as measured)",
                 ["x_mm", "y_mm", "corrected_nm"],
             )),
-        TableSpec::new("residual", "what is left point by point", [places(), residual].concat()).figure(Figure::map(
+        TableSpec::new("residual", "the residual point by point", [places(), residual].concat()).figure(Figure::map(
             "residual",
             "Residual of the final model",
             ["x_mm", "y_mm", "after_nm"],

@@ -313,7 +313,7 @@ impl Cut {
             let mut cut = |pass: usize| {
                 let beside_mm = (at - pass as f64) * per_pass_mm;
                 let (tip, across) = (tips[pass], beside_mm * beside_mm);
-                // An arc is nowhere lower than its parabola: most passes beside the nearest are not looked at.
+                // An arc is nowhere lower than its parabola: most passes beside the nearest are not evaluated.
                 if across > square || across * parabola + tip > best.0 {
                     return;
                 }

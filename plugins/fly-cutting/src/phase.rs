@@ -25,7 +25,7 @@ pub(crate) struct Phased {
     pub phase_mm: f64,
     pub level_nm: f64,
     pub surface: Surface,
-    /// What is left, in nm.
+    /// The residual, in nm.
     pub residual_nm: Vec<f64>,
     /// Change of the surface with the phase, without its mean, of norm 1; nothing where the scallops do not show.
     pub direction: Vec<f64>,

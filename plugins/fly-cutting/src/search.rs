@@ -1,4 +1,4 @@
-//! Where a line, another feed or shifted rows may be: correlations of what is left with every frequency.
+//! Where a line, another feed or shifted rows may be: correlations of the residual with every frequency.
 //!
 //! A line of q periods a turn adds Re a·e^{2πi q τ} at the turns τ = n + θ/2π. n is whole, so that e^{2πi q n} has the fraction of q
 //! only; the rows, whose angles θ differ, show the whole part. The sum over passes is a Fourier transform a row, the sum over rows is
@@ -27,16 +27,16 @@ const PEAKS: usize = 4;
 const LEAST_PEAK: f64 = 0.1;
 /// Periods over the map by which peaks are apart.
 const BESIDE: f64 = 3.0;
-/// Feeds within ± this share are looked at.
+/// Feeds within ± this share are evaluated.
 const FEEDS: f64 = 0.03;
-/// Part of a period at the end of the map between feeds that are looked at.
+/// Part of a period at the end of the map between feeds that are evaluated.
 const FEED_STEP: f64 = 0.4;
-/// Shifts of rows that are looked at, to each side.
+/// Shifts of rows that are evaluated, to each side.
 const MOST_SHIFTS: f64 = 2000.0;
 /// What has to explain more than the declared cut by this factor, so that a search begins elsewhere.
 const MORE: f64 = 1.1;
 
-/// Other feeds that are looked at, of a map of so many passes.
+/// Other feeds that are evaluated, of a map of so many passes.
 pub(crate) fn feeds(passes: usize) -> usize {
     (2.0 * FEEDS * passes as f64 / FEED_STEP).ceil() as usize
 }
@@ -67,13 +67,13 @@ impl Shift {
         (step.is_finite() && count >= 1.0).then_some(Self { per_unit_mm, step, count: count as i32 })
     }
 
-    /// Values that are looked at.
+    /// Values that are evaluated.
     pub(crate) fn tried(&self) -> usize {
         2 * self.count as usize + 1
     }
 }
 
-/// What is left of a map, pass by pass.
+/// The residual of a map, pass by pass.
 pub(crate) struct Left<'a> {
     pub heights: &'a Heights,
     pub surface: &'a Surface,
@@ -267,7 +267,7 @@ impl Left<'_> {
         (best != 0 && most > MORE * explained(0)).then_some(f64::from(best) * shift.step)
     }
 
-    /// What is left without its mean, with the scallops of the model put back.
+    /// The residual without its mean, with the scallops of the model put back.
     fn with_scallops(&self, cut: &Cut) -> Vec<f64> {
         let mut heights = self.residual_nm.to_vec();
         let square = cut.nose_mm * cut.nose_mm;

@@ -26,7 +26,7 @@ const TOO_SMOOTH: f64 = 0.3;
 /// χ² per degree of freedom from which more is left than noise.
 const MORE_THAN_NOISE: f64 = 1.5;
 
-/// The ideal surface of a cut, what is left of it, and a model for the closed loop.
+/// The ideal surface of a cut, its residual, and a model for the closed loop.
 #[derive(Debug, Clone)]
 pub struct FlyCutting(pub(crate) FlyCuttingConfig);
 
@@ -159,7 +159,7 @@ impl FlyCutting {
         let phase_um = last.phase_um().map(|[phase, std]| [phase, if settings.is_empty() { std } else { f64::NAN }]);
         if phase_um.is_none() {
             remarks
-                .push("the scallops do not show above what is left: their phase is not observable and set to 0".into());
+                .push("the scallops do not show above the residual: their phase is not observable and set to 0".into());
         }
         let known = Known {
             config: &self.0,

@@ -1,16 +1,16 @@
-//! What is left in single places: scratches, pits, dust. No effect of the library is local.
+//! The residual in single places: scratches, pits, dust. No effect of the library is local.
 
 use runout_core::{height_grid::GridPlaces, numerics::least_squares::dot};
 
 use crate::heights::Heights;
 
-/// Chance of noise being taken for a stranger anywhere on the map, about.
+/// Chance of noise being taken for an unmodelled disturbance anywhere on the map, about.
 const CHANCE: f64 = 1e-3;
-/// Sides of the tiles in which what is left is summed, in points.
+/// Sides of the tiles in which the residual is summed, in points.
 const TILES: [usize; 2] = [4, 16];
-/// Above this share of the map, what is left is not local.
+/// Above this share of the map, the residual is not local.
 const LOCAL: f64 = 0.15;
-/// Neighbours that are taken with a stranger, in points.
+/// Neighbours that are taken with an unmodelled disturbance, in points.
 const MARGIN: usize = 2;
 /// Standard deviation of normal noise over its median absolute deviation.
 const NORMAL: f64 = 1.4826;
@@ -26,14 +26,14 @@ pub(crate) struct Stranger {
     pub rms_nm: f64,
 }
 
-/// Strangers, the largest first, and the points that they take.
+/// Unmodelled disturbances, the largest first, and the points that they take.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Strangers {
     pub all: Vec<Stranger>,
     pub taken: Vec<bool>,
 }
 
-/// Looks for them in what is left of all points, in nm.
+/// Looks for them in the residual of all points, in nm.
 pub(crate) fn find(heights: &Heights, grid: &GridPlaces, residual_nm: &[f64]) -> Strangers {
     let noise_nm = heights.std_nm.unwrap_or(0.0).max(spread(residual_nm.to_vec()));
     let count = residual_nm.len() as f64;

@@ -1,4 +1,4 @@
-//! The closed loop: what is there is found with its size, nothing else is, and strangers are unexplained.
+//! The closed loop: what is there is found with its size, nothing else is, and unmodelled disturbances are unexplained.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
@@ -165,7 +165,7 @@ fn large_and_joint_effects_are_found() {
 }
 
 #[test]
-fn strangers_are_unexplained_with_their_place() {
+fn unmodelled_disturbances_are_unexplained_with_their_place() {
     let cases = [
         ("plugin = 'pit'\nat_mm = [1.2, 2.5]\nradius_mm = 0.06\ndepth_nm = 8.0", [1.2, 2.5]),
         ("plugin = 'scratch'\nfrom_mm = [2.8, 1.0]\nto_mm = [3.2, 1.6]\nwidth_mm = 0.06\ndepth_nm = 5.0", [3.0, 1.3]),

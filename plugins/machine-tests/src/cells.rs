@@ -191,7 +191,7 @@ impl Cells {
         MeasuredAgain { error: of(&again).iter().zip(&truth).map(|(again, truth)| again - truth).collect(), truth }
     }
 
-    /// The same of an instrument whose scale is longer by so much.
+    /// The cells of an instrument whose scale is longer by `slope`.
     pub(crate) fn tilted(mut self, targets: &[f64], slope: f64) -> Self {
         for (means, target) in self.mean.iter_mut().zip(targets) {
             means.iter_mut().for_each(|mean| *mean += slope * (target - targets[0]));

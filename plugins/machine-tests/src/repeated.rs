@@ -11,7 +11,7 @@ use runout_core::{
 
 use crate::runs::{Approaches, mean};
 
-/// Series that are looked at, evenly taken of more.
+/// Series that are evaluated, evenly taken of more.
 const MOST_SERIES: usize = 20;
 /// Parts of the travel whose scatter is compared.
 const PARTS: usize = 3;
@@ -37,7 +37,8 @@ fn contradicting(mut checks: Vec<Check>) -> Vec<Check> {
     checks
 }
 
-/// The same with the factor on the standard uncertainty of each mean, by which a dependence widens it.
+/// Judges numbers that were taken one after the other, in series of their own, and gives the factor on the standard uncertainty
+/// of each mean, by which a dependence widens it.
 pub(crate) fn means_in_order(what: &str, series: &[(&str, &[f64])], unit: &str) -> Judgement {
     Series::of(series).judged(what, unit, true)
 }

@@ -40,7 +40,7 @@ impl Approaches {
         Self::of_rows(points, "", points.column(target)?, direction, points.column(deviation)?)
     }
 
-    /// The same of some rows; `of_what` names them in an error.
+    /// Sorts some rows; `of_what` names them in an error. Without `direction` the side follows from the target before, in the order of the rows.
     pub(crate) fn of_rows(
         points: &Points,
         of_what: &str,
@@ -105,8 +105,8 @@ impl Approaches {
         self.deviations.iter().flatten().map(Vec::len).min().unwrap_or(0)
     }
 
-    /// The same less what changes alike at all targets with the number of the row, but for its mean: a polynomial, by what each target and side shows of
-    /// it from run to run.
+    /// The approaches less what changes alike at all targets with the number of the row, but for its mean: a polynomial, by what
+    /// each target and side shows of it from run to run.
     pub(crate) fn without_drift(&self) -> Self {
         let count = self.rows.iter().flatten().map(Vec::len).sum::<usize>();
         let time = |row: usize| 2.0 * row as f64 / count as f64 - 1.0;
@@ -194,7 +194,8 @@ pub(crate) struct Noise {
     /// What a run is off by as a whole, of the mean of both sides: two parts that do not depend on each other, each the level and what grows along the
     /// travel to its ends, of one standard deviation.
     pub common: [[f64; 2]; 2],
-    /// The same of half of what the sides are apart by.
+    /// Half of what the two sides of a run are apart by as a whole: two parts that do not depend on each other, each the level
+    /// and what grows along the travel to its ends, of one standard deviation.
     pub apart: [[f64; 2]; 2],
     pub own_std: f64,
     /// Places along the travel: two apart at its ends, 0 on average.

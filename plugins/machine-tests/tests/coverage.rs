@@ -61,7 +61,7 @@ impl Axis {
         self.measured_beside(chance, targets_mm, runs, |_| 0.0)
     }
 
-    /// The same beside what changes with the number of the approach.
+    /// Measures the axis beside what changes with the number of the approach.
     fn measured_beside(
         &self,
         chance: &mut Chance,
@@ -104,7 +104,7 @@ impl Axis {
 }
 
 #[test]
-fn intervals_of_positioning_hold_the_truth() {
+fn intervals_of_positioning_cover_the_true_value() {
     let targets: Vec<f64> = (0..11).map(|index| 50.0 * f64::from(index) + 3.0 * f64::from(index * index % 7)).collect();
     let trials = crate::trials::trials(100) as u32;
     let mut worst = f64::INFINITY;
@@ -234,7 +234,7 @@ fn a_drift_in_step_order_is_in_the_interval_of_accuracy() {
 }
 
 #[test]
-fn intervals_of_circles_hold_the_truth() {
+fn intervals_of_circles_cover_the_true_value() {
     let trials = crate::trials::trials(16) as u32;
     let (mut all, mut kept) = (0.0, 0.0);
     for turns in [2, 3, 5] {

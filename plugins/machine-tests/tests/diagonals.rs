@@ -140,7 +140,7 @@ fn a_squareness_makes_diagonals_unlike() {
 }
 
 #[test]
-fn intervals_hold_the_truth_of_a_simulated_machine() {
+fn intervals_cover_the_true_value_of_a_simulated_machine() {
     let machine = machine();
     let mut worst = 1.0_f64;
     for (runs, noise_um, of_run_um) in [(5, 0.2, 0.0), (3, 0.5, 0.0), (5, 0.2, 0.4)] {

@@ -66,7 +66,7 @@ fn true_ranges() -> [f64; 3] {
 }
 
 #[test]
-fn intervals_of_the_ranges_hold_the_truth() {
+fn intervals_of_the_ranges_cover_the_true_value() {
     let [z, x, y] = true_ranges();
     let combined = (x * x + y * y + z * z).sqrt();
     let wanted =
@@ -90,7 +90,7 @@ fn intervals_of_the_ranges_hold_the_truth() {
 
 /// Courses that are farthest out often, and ones that jump: once a minute a reading of twelve hours.
 #[test]
-fn intervals_hold_the_truth_of_waves_and_of_steps() {
+fn intervals_cover_the_true_value_of_waves_and_of_steps() {
     type Course = fn(f64) -> f64;
     let courses: [(&str, Course, f64); 4] = [
         ("waves", |minute| 3.0 * (TAU * minute / 120.0).sin(), 6.0),

@@ -36,7 +36,7 @@ fn measured(play_um: f64, readings: usize, turns: usize, mut noise_um: impl FnMu
 
 /// Before the least form was taken as flat as it may be, and readings were drawn at their own angles, half of these intervals missed.
 #[test]
-fn intervals_hold_the_truth_of_play_and_of_nothing() {
+fn intervals_cover_the_true_value_of_play_and_of_no_play() {
     let trials = crate::trials::trials(18) as u64;
     for (play_um, readings, turns) in [(5.0, 360, 5), (5.0, 1000, 5), (3.0, 360, 3), (0.0, 360, 5)] {
         let truth = measured(play_um, readings, 1, || 0.0);

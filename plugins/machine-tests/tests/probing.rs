@@ -149,7 +149,7 @@ fn touches_of_a_point_have_their_range() {
 }
 
 #[test]
-fn intervals_of_repeated_touches_hold_the_mean_range() {
+fn intervals_of_repeated_touches_cover_the_mean_range() {
     for (count, mean_range) in [(5, 2.326), (10, 3.078)] {
         let mut held = Held::default();
         let mut chance = Chance::new(count as u64);
@@ -177,7 +177,7 @@ fn truth_um(probe: &Probe, ring: bool) -> f64 {
 }
 
 #[test]
-fn intervals_of_probing_errors_hold_the_truth() {
+fn intervals_of_probing_errors_cover_the_true_value() {
     for ring in [true, false] {
         for (amplitude_um, noise_um, sets) in [(3.0, 0.2, 3), (1.0, 0.5, 3), (0.0, 0.5, 5), (2.0, 0.3, 2)] {
             let probe = Probe { amplitude_um, noise_um, moves_um: 5.0 };

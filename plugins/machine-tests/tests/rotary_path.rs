@@ -150,7 +150,7 @@ fn an_offset_is_a_wave_of_5_um() {
 }
 
 #[test]
-fn intervals_hold_the_truth_of_a_simulated_table() {
+fn intervals_cover_the_true_value_of_a_simulated_table() {
     for (passes, noise_um) in [(2, 0.3), (3, 1.0), (5, 0.5)] {
         let table = Table { axis: RotaryAxis::C, ball_mm: [120.0, 20.0, 60.0], noise_um };
         let mut chance = Chance::new(passes as u64 + 20);

@@ -55,7 +55,7 @@ fn a_window_has_its_peak_to_valley() {
 }
 
 #[test]
-fn intervals_hold_the_mean_of_many_windows() {
+fn intervals_cover_the_mean_of_many_windows() {
     let truth = {
         let found = separated(config(0.5), &vibration(&mut Chance::new(77), 400, 1000)).unwrap();
         value(&found, "structural-motion", "X").value

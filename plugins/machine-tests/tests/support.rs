@@ -72,7 +72,7 @@ pub(crate) fn value<'a>(outcome: &'a Outcome, symbol: &str, of: &str) -> &'a Val
     outcome.values.iter().find(found).unwrap_or_else(|| panic!("{symbol} of {of}"))
 }
 
-/// How often intervals hold a truth, by name.
+/// How often intervals cover the true value, by name.
 #[derive(Default)]
 pub(crate) struct Held(std::collections::BTreeMap<String, [usize; 2]>);
 

@@ -114,7 +114,7 @@ mod tests {
                 .map(|section| (poly(section.b, z) / poly([1.0, section.a[0], section.a[1]], z)).norm_sqr())
                 .product();
             assert!((gain - 0.5_f64.sqrt()).abs() < 1e-12, "order {order}: {gain}");
-            // What values are told of the filter.
+            // What is stated of the filter beside values.
             let response = Response { description: String::new(), half_power_hz, order, sample_rate_hz: 1000.0 };
             for frequency_hz in [1.0, 40.0, 90.0, 150.0, 300.0] {
                 let z = num_complex_exp(frequency_hz / 1000.0);

@@ -214,7 +214,7 @@ impl Bridged<'_> {
         let both: Vec<[f64; 2]> = left.iter().chain(&right).copied().collect();
         let cubic = if left.len() < TERMS || right.len() < TERMS { [0.0; TERMS] } else { polynomial(&both) };
         let leaves = |[place, reading]: &[f64; 2]| reading - value(&cubic, *place);
-        // Mean place of some readings, and mean of what is left of them.
+        // Mean place of some readings, and mean of their residual.
         let mean = |ends: &[[f64; 2]]| {
             let count = ends.len() as f64;
             let of = |each: &dyn Fn(&[f64; 2]) -> f64| ends.iter().map(each).sum::<f64>() / count;

@@ -29,7 +29,7 @@ const FORGOTTEN: f64 = 1e-18;
 const DEFECT_SHARE: f64 = 1e-6;
 /// Frames that are handed on at once, at least.
 const PIECE: usize = 4096;
-/// The same, as a multiple of the backward pass's lookahead, which is filtered for nothing.
+/// Frames that are handed on at once, at least, as a multiple of the backward pass's lookahead, which is filtered for nothing.
 const PIECE_LOOKAHEADS: usize = 4;
 /// Share of the sampling rate below which the sections' own rounding would show.
 const LOWEST_SHARE: f64 = 1e-5;

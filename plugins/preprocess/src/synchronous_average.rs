@@ -262,7 +262,7 @@ fn most_angles(turn_samples: f64) -> usize {
     turn.saturating_mul(times).max(fewest)
 }
 
-/// Most that are asked for: what a rig sees of each order below half of them is looked at before anything is read, in 0.5 kB an order.
+/// Most that are asked for: what a rig sees of each order below half of them is evaluated before anything is read, in 0.5 kB an order.
 const MOST_SAMPLES_PER_REV: usize = 131_072;
 /// Fewest samples that a turn may have: fewer come from marks in another unit.
 const SHORTEST_TURN: f64 = 8.0;

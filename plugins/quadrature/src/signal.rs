@@ -110,7 +110,7 @@ impl Signal {
             let waves = of.iter().flat_map(|component| [0, 1].map(|wave| (*component, wave)));
             waves.map(|(component, wave)| places.iter().map(|place| place.column(component, wave)).collect()).collect()
         };
-        // What is left of the distances beside components of the first order.
+        // The residual of the distances beside components of the first order.
         let left = |signal: &Self| {
             let places = signal.places(phase_rad, radius);
             let mut left: Vec<f64> = places.iter().map(|place| place.distance).collect();
@@ -243,7 +243,7 @@ impl Place {
         (Complex64::cis(self.angle_rad) * self.normal.conj()).re
     }
 
-    /// The same by the cosine or the sine of a component, as the radius of a circle would have them.
+    /// Change of the curve along its normal by the cosine or the sine of a component, as the radius of a circle would have them.
     pub(crate) fn column(&self, component: Component, wave: usize) -> f64 {
         let unit = component.of_radius([[1.0, 0.0], [0.0, 1.0]][wave]);
         (unit * Complex64::cis(f64::from(component.0) * self.angle_rad) * self.normal.conj()).re

@@ -265,7 +265,7 @@ fn strong_ellipses_are_corrected_exactly() {
         let (found, [before, after, stated]) = corrected(&recording, Some(&sines));
         println!("{x} {y} {gain} {degrees}°: {before:.5} → {after:.5} ± {stated:.5} rad, {:?}", found.after);
         assert!(after < 0.2_f64.to_radians() * 1.5 && after < 1.15 * stated && stated < 1.15 * after, "{found:?}");
-        // What is left is the noise of the signals.
+        // The residual is the noise of the signals.
         assert!((found.after.residual_rms_um - 1.0).abs() < 0.06, "{:?}", found.after);
         let truths = [
             ("cosine", 500.0 * x),

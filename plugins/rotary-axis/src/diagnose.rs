@@ -85,7 +85,7 @@ struct Run {
 }
 
 impl Run {
-    /// Effects that are not believed: of a size that no machine has, as those have that the rows hardly show; and, where something else is in
+    /// Effects that are not accepted: of a size that no machine has, as those have that the rows hardly show; and, where something else is in
     /// the data, steps: their time is free, so that they take a part of much that is none.
     fn doubtful(&self) -> Vec<usize> {
         let absurd = |setting: &Setting| {

@@ -14,7 +14,7 @@ const MOST_LEFT_OUT: usize = 40;
 /// A command left out is predicted where its neighbours are at most this many median steps apart.
 const WIDEST_STEPS: f64 = 3.5;
 
-/// What is left of each reading (mm) by a fit that has not seen its command, with component errors interpolated linearly between
+/// The residual of each reading (mm) of a fit without its command, with component errors interpolated linearly between
 /// the commands beside it; nothing beside a gap.
 pub(crate) fn left_out(campaign: &Campaign, effects: &[Column], whole: &Fit) -> Vec<Option<Vector3<f64>>> {
     let Campaign { layout, readings, commands_deg, .. } = campaign;

@@ -19,7 +19,7 @@ pub(crate) struct Rows {
 }
 
 impl Rows {
-    /// Shapes beside effects that were added: of one that was, its own; else the one that explains most of what is left.
+    /// Shapes beside effects that were added: of one that was, its own; else the one that explains most of the residual.
     pub(crate) fn shapes(&self, from: Shapes, added: &[Setting], grids: &[Vec<f64>; 6]) -> Shapes {
         let mut next = from;
         for (own, candidate) in CANDIDATES.iter().enumerate() {

@@ -193,7 +193,7 @@ struct Block {
 /// The linear system at a state.
 struct System {
     blocks: Vec<Block>,
-    /// Rows without component errors, of all commands: what is left, and by the common unknowns.
+    /// Rows without component errors, of all commands: the residual, and by the common unknowns.
     left: DVector<f64>,
     free: DMatrix<f64>,
     /// The gauge: C·x = f.

@@ -1,4 +1,4 @@
-//! Random campaigns: what is there is named, nothing else is, and strangers are unexplained.
+//! Random campaigns: what is there is named, nothing else is, and unmodelled disturbances are unexplained.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 

@@ -1,4 +1,4 @@
-//! The closed loop: every effect alone, small and large; clean campaigns; what is blind, confounded, or a stranger.
+//! The closed loop: every effect alone, small and large; clean campaigns; what is not observable, confounded, or an unmodelled disturbance.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
@@ -251,7 +251,7 @@ fn several_effects_are_found_together() {
 }
 
 #[test]
-fn strangers_are_said_to_be_unexplained() {
+fn unmodelled_disturbances_are_reported_as_unexplained() {
     // A ball slips in the middle of its pass; one reading is bad.
     let slip = diagnosed(THREE_BALLS, CONFIG, "effect = [{ plugin = 'slipped-ball', row = 50, by_um = [25, -10, 5] }]");
     println!("{:?} {:?}", slip.diagnosis.verdict, slip.diagnosis.added);

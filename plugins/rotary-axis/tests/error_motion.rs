@@ -106,7 +106,7 @@ fn values_are_those_of_the_simulated_motion() {
 }
 
 #[test]
-fn intervals_of_the_values_hold_the_truth() {
+fn intervals_of_the_values_cover_the_true_value() {
     for (noise, config) in [("noise_um = 1.0", "std_um = 1.0"), ("noise_um = 2.3\npasses = 2", "")] {
         let (campaigns, mut held) = (trials(200), truths().map(|(symbol, _)| (symbol, 0)));
         for seed in 0..campaigns as u64 {

@@ -45,7 +45,7 @@ fn errors_far_larger_than_usual_are_recovered() {
     }
 }
 
-/// Share of 95 % intervals that hold the truth, over campaigns.
+/// Share of 95 % intervals that cover the true value, over campaigns.
 fn coverage(config: &str, more: &str, seeds: u64) -> ([f64; 4], [f64; 6], [f64; 4]) {
     let separator = separator(config);
     let mut held = [0.0; 4];
@@ -92,12 +92,12 @@ fn hold_in(config: &str, more: &str, seeds: usize) {
 }
 
 #[test]
-fn intervals_hold_the_truth_with_stated_noise() {
+fn intervals_cover_the_true_value_with_stated_noise() {
     hold_in(&format!("{THREE_BALLS}std_um = 2.3"), "noise_um = 2.3", trials(300));
 }
 
 #[test]
-fn intervals_hold_the_truth_with_noise_from_repeats() {
+fn intervals_cover_the_true_value_with_noise_from_repeats() {
     hold_in(THREE_BALLS, "noise_um = 2.3\npasses = 3", trials(200));
 }
 

@@ -54,7 +54,7 @@ impl<'a> Search<'a> {
         roots.chunk_by(same).map(|roots| self.at(roots)).collect::<Result<Vec<_>>>().map(|found| found.concat())
     }
 
-    /// The same as speeds alone, with a relative accuracy of one in a thousand.
+    /// Speeds of the lowest crossings, ascending, with a relative accuracy of one in a thousand.
     ///
     /// # Errors
     /// When eigenvalues do not converge.

@@ -28,7 +28,7 @@ pub struct Node {
     pub z_mm: f64,
     /// Index of its displacement along x; `None` where it cannot move or the model has none.
     pub x: Option<usize>,
-    /// The same along y.
+    /// Index of its displacement along y; `None` where it cannot move or the model has none.
     pub y: Option<usize>,
 }
 

@@ -119,7 +119,7 @@ fn align_one(modes: &mut [Mode], nodes: &[Node]) {
     };
     let along_x = sum(|a, b| a.0.conj() * b.0);
     let whole = sum(|a, b| a.0.conj() * b.0 + a.1.conj() * b.1);
-    // The largest share of x: eigenvectors of L⁻¹·X·L⁻ᴴ, taken back by L⁻ᴴ.
+    // The largest share of x: eigenvectors of L⁻¹·X·L⁻ᴴ, transformed back by L⁻ᴴ.
     let Ok(factor) = whole.llt(Side::Lower) else { return };
     let lower = factor.L();
     let mut half = along_x;

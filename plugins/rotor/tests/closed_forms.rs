@@ -276,7 +276,7 @@ fn both_ways_to_a_critical_speed_agree() {
     }
 }
 
-/// The same rotor turning the other way has the same frequencies.
+/// A rotor has the same frequencies when it turns the other way.
 #[test]
 fn frequencies_do_not_depend_on_the_direction_of_rotation() {
     let parts = overhung(400.0, 25.0);

@@ -253,7 +253,7 @@ impl SpatialError {
     }
 }
 
-/// What is left of the readings beyond their noise.
+/// The residual of the readings beyond their noise.
 fn above_noise(campaign: &Campaign, level: &Level) -> Option<Unexplained> {
     let noise_dof = match campaign.noise {
         Noise::Repeats { dof, .. } => (dof * campaign.measured.len()) as f64,

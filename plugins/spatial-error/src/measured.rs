@@ -15,7 +15,7 @@ use runout_core::{
 const LARGE_UM: f64 = 2000.0;
 /// The largest deviation below this, in µm, looks like another unit.
 const SMALL_UM: f64 = 0.02;
-/// The same as a share of the extent of the places.
+/// A largest deviation below this share of the extent of the places looks like another unit.
 const SMALL_SHARE: f64 = 2e-6;
 /// Share of the other components below which the largest deviation of one looks like another unit.
 const UNLIKE: f64 = 0.01;

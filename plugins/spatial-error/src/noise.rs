@@ -43,7 +43,7 @@ pub(crate) struct Repeats {
     members: Vec<Vec<usize>>,
     /// Each measured component less its mean at the place, place by place.
     within: Vec<DVector<f64>>,
-    /// The same less drift and step.
+    /// Each measured component less its mean at the place, drift and step.
     left: Vec<DVector<f64>>,
     /// Drift and step, orthonormal.
     basis: Vec<DVector<f64>>,

@@ -40,7 +40,7 @@ impl Query {
         Ok(())
     }
 
-    /// The same with a path that does not depend on the folder.
+    /// The query with a path that does not depend on the folder.
     #[must_use]
     pub fn resolved(&self, context: &Context) -> Self {
         Self { grid_mm: self.grid_mm, path: self.path.as_ref().map(|path| context.path(path)) }

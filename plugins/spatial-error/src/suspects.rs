@@ -13,7 +13,7 @@ use crate::{
 /// Places that are left out together, of each place and so many of its nearest.
 const TOGETHER: usize = 3;
 const NEAREST: usize = 6;
-/// Places up to which groups are looked at.
+/// Places up to which groups are evaluated.
 const MOST_PLACES: usize = 1500;
 /// Chance of a group, times the number of groups, below which it is named.
 const CHANCE: f64 = 1e-6;

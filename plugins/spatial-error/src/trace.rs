@@ -20,7 +20,7 @@ use crate::{
     terms::Term,
 };
 
-/// Chance of noise doing as much, corrected for the number of candidates, below which an effect is believed.
+/// Chance of noise doing as much, corrected for the number of candidates, below which an effect is accepted.
 const P_LIMIT: f64 = 1e-3;
 /// "Very strong" evidence (Kass, Raftery, J. Am. Stat. Assoc. 90 (1995) 773).
 const BIC_LIMIT: f64 = -10.0;

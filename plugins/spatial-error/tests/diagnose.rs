@@ -1,4 +1,4 @@
-//! The loop: each effect alone, clean campaigns, strangers.
+//! The loop: each effect alone, clean campaigns, unmodelled disturbances.
 
 #![allow(clippy::unwrap_used, reason = "tests")]
 
@@ -51,7 +51,7 @@ fn effects_are_found_with_their_values() {
     let target = |name: &str| [name.to_owned()];
     let cases = [
         (SimulatedEffect::Scale { targets: target("Y"), scale_um_per_m: 150.0 }, "scale", "Y", 150.0),
-        // Four heights do not tell a scale from a positioning error of a higher order: the scale is the simpler one.
+        // Four heights do not distinguish a scale from a positioning error of a higher order: the scale is the simpler one.
         (SimulatedEffect::Scale { targets: target("Z"), scale_um_per_m: 90.0 }, "scale", "Z", 90.0),
         (SimulatedEffect::Squareness { targets: target("XZ"), angle_urad: -120.0 }, "squareness", "XZ", -120.0),
         (
@@ -92,7 +92,7 @@ fn effects_are_found_with_their_values() {
 }
 
 #[test]
-fn strangers_are_unexplained_with_their_place() {
+fn unmodelled_disturbances_are_unexplained_with_their_place() {
     let step = SimulatedEffect::Step { axis: "X".into(), at_mm: 310.0, by_um: [14.0, -9.0, 0.0] };
     let found = diagnose(&with(31, step), COARSE);
     assert_eq!((found.verdict, found.added.len()), (Verdict::Unexplained, 0), "{:?}", found.added);
@@ -138,7 +138,7 @@ fn changed(seed: u64, change: impl Fn(f64, usize) -> f64) -> Points {
     points
 }
 
-/// A sine is none of the effects: what is added beside it, and what is left, is not called explained.
+/// A sine is none of the effects: what is added beside it, and the residual, is not called explained.
 #[test]
 fn what_the_data_contradict_is_not_explained() {
     let settings = Settings { max_added: 40, ..Settings::default() };

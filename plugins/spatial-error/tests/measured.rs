@@ -101,9 +101,9 @@ fn at_least_one_component_is_needed() {
 }
 
 /// One pass over a plane, smooth errors with a nugget, and a third component that is constant, or nearly: 95 % intervals of the other
-/// two hold the smooth error of unseen places.
+/// two cover the smooth error of unseen places.
 #[test]
-fn intervals_hold_beside_a_constant_component() {
+fn intervals_cover_the_true_error_beside_a_constant_component() {
     let mut held = [0.0; 3];
     let mut asked = 0.0;
     let campaigns = trials(8);

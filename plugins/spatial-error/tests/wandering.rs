@@ -53,7 +53,7 @@ fn in_rows(seed: u64) -> Scenario {
 }
 
 #[test]
-fn predictions_hold_beside_a_tracker_that_wanders() {
+fn predictions_cover_the_true_error_beside_a_tracker_that_wanders() {
     let (mut shares, mut said, mut moved) = (Vec::new(), 0, 0);
     let campaigns = trials(12);
     for seed in 0..campaigns as u64 {
@@ -77,7 +77,7 @@ fn predictions_hold_beside_a_tracker_that_wanders() {
 
 /// A warm-up bends early: a third of the campaign is its time constant. As it is explained, predictions are those of the first reading.
 #[test]
-fn predictions_hold_behind_a_warm_up() {
+fn predictions_cover_the_true_error_behind_a_warm_up() {
     let drift = |target: &str, drift_um: f64| SimulatedEffect::ThermalDrift {
         targets: [target.into()],
         drift_um,

@@ -60,7 +60,7 @@ pub struct SensorAlteration {
     pub angle_rad: f64,
     /// True less declared axial position, in mm.
     pub z_mm: f64,
-    /// The same, as far as the sensor sees another circle of the part there, in mm.
+    /// True less declared axial position, as far as the sensor sees another circle of the part there, in mm.
     pub circle_mm: f64,
     /// Share of the spindle's motion with which the sensor's own bracket moves.
     pub bracket_share: f64,
@@ -106,7 +106,7 @@ pub enum PatternOf {
     SensorOnSpindle(usize),
     /// Those of a setup as a motion of the axis along x, which turns with the spindle.
     MotionX(usize),
-    /// The same along y.
+    /// Those of a setup as a motion of the axis along y, which turns with the spindle.
     MotionY(usize),
 }
 
@@ -244,7 +244,7 @@ impl Alterations {
         self.places[swapped]
     }
 
-    /// Whether all values are such that readings can be taken back to displacements.
+    /// Whether all values are such that readings can be converted to displacements.
     #[must_use]
     pub fn are_possible(&self) -> bool {
         let sensor = |sensor: &SensorAlteration| {
@@ -271,7 +271,7 @@ impl Alterations {
 }
 
 impl SetupAlteration {
-    /// The angle at which the recording believes to be when the spindle is at this one: φ + ε(φ) = Φ, with ε 0 at the marks.
+    /// The angle that the recording assumes when the spindle is at this one: φ + ε(φ) = Φ, with ε 0 at the marks.
     pub(crate) fn recorded_at(&self, angle_rad: f64) -> f64 {
         let early = |angle: f64| self.ripples.iter().map(|ripple| ripple.at(angle) - ripple.cosine).sum::<f64>();
         let mut recorded = angle_rad;
@@ -325,7 +325,7 @@ impl SensorAlteration {
         self.applied_in(effect, None)
     }
 
-    /// The same of a transfer that acts in one setup only.
+    /// The values with which an effect [stated](Transfer::of) a transfer that acts in one setup only; `None` where it is not applied.
     #[must_use]
     pub fn applied_in(&self, effect: &str, setup: Option<usize>) -> Option<&[f64]> {
         let stated = self.transfers.iter().filter(|transfer| transfer.setup == setup);

@@ -205,7 +205,7 @@ impl Layout {
         self.sections.iter().filter_map(|section| Some((*section, self.form_bound_um(*section)?)))
     }
 
-    /// The same layout, with a limit on the noise that an order may carry.
+    /// The layout with a limit on the noise that an order may carry.
     #[must_use]
     pub fn limited_to(self, max_noise_gain: f64) -> Self {
         Self { max_noise_gain, systems: Systems::default(), ..self }

@@ -253,7 +253,7 @@ impl<'a> Trial<'a> {
         self.left_with(&alterations, limit)
     }
 
-    /// The same with effects applied.
+    /// χ² per degree of freedom with effects applied; `None` where it is above the limit, or nothing is redundant.
     fn left_with(&self, alterations: &Alterations, limit: f64) -> Option<f64> {
         let layout = self.layout.altered(alterations);
         let count = layout.readings.len();

@@ -186,7 +186,7 @@ fn the_search_finds_what_a_long_random_search_finds() {
 /// With a tolerance the search ranks by the worst corner, so that its best is no worse there than the best without; and what
 /// it says of it is no better than any corner, or what lies between.
 #[test]
-fn a_tolerance_is_looked_at_in_every_corner_and_between() {
+fn a_tolerance_is_evaluated_in_every_corner_and_between() {
     let rig = evenly(3);
     let plain = search(60);
     let tolerant = Search { angle_tolerance_deg: 0.5, ..plain.clone() };

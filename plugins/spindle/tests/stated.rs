@@ -139,9 +139,9 @@ fn marks_known_to_half_a_sample_are_in_the_uncertainty() {
     assert!(chi2.iter().all(|chi2| (0.6..4.0).contains(chi2)), "{chi2:?}");
 }
 
-/// What a diagnosis states holds the truth, whether it finds by how much the setups are turned or not.
+/// What a diagnosis states covers the true value, whether it finds by how much the setups are turned or not.
 #[test]
-fn a_diagnosis_of_marks_at_whole_samples_holds_the_truth() {
+fn a_diagnosis_of_marks_at_whole_samples_covers_the_true_value() {
     let mut inside = 0;
     for seed in 1..=3 {
         let config = campaign(seed, "[]");

@@ -48,7 +48,9 @@ impl Kind {
         match self {
             Self::AxialRegistration => "a trace along an axis is shifted: its z is too small",
             Self::SensorGain => "a trace's readings are too large by a factor",
-            Self::PartTilt => "a cylinder is tilted sideways under the probe, which leaves its generatrix: a parabola",
+            Self::PartTilt => {
+                "a cylinder is tilted across the trace under the probe, which leaves its generatrix: a parabola"
+            }
             Self::RotationOffset => "the part was not turned by exactly 180° about its axis before the reversed traces",
             Self::ThermalDrift => "readings settle along a trace: exponentially in time",
         }

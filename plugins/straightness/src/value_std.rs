@@ -68,7 +68,7 @@ impl ProfileErrors {
         }
     }
 
-    /// The same at some of the positions.
+    /// The errors at some of the positions.
     #[must_use]
     pub(crate) fn at(&self, kept: &[usize]) -> Self {
         let select = |values: &Vec<f64>| kept.iter().filter_map(|at| values.get(*at).copied()).collect::<Vec<f64>>();

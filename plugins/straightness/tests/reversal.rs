@@ -85,7 +85,7 @@ fn even(first: f64, step: f64, count: usize) -> Vec<f64> {
     (0..count).map(|index| first + step * index as f64).collect()
 }
 
-/// What is left of a profile without its least-squares line, by the normal equations in z itself.
+/// The residual of a profile about its least-squares line, by the normal equations in z itself.
 fn without_line(z: &[f64], profile: impl Fn(f64) -> f64) -> Vec<f64> {
     let sum = |of: &dyn Fn(f64) -> f64| z.iter().map(|z| of(*z)).sum::<f64>();
     let (n, sz, szz) = (z.len() as f64, sum(&|z| z), sum(&|z| z * z));
@@ -197,7 +197,7 @@ fn the_stated_uncertainty_covers_the_truth() {
 /// The errors that the domain offers with both profiles are those that the profiles have: of straightness values, at little and at much
 /// noise, from four degrees of freedom a position.
 #[test]
-fn intervals_of_the_standards_values_hold_the_truth() {
+fn intervals_of_the_standards_values_cover_the_true_value() {
     let z = even(0.0, 1.0, 121);
     let look = |deviation_um: &[f64], values: &mut Vec<f64>| {
         let found = Values::of(&z, deviation_um);

@@ -153,7 +153,7 @@ pub(crate) struct Fitted {
     pub variance: f64,
     /// χ² per degree of freedom, where the noise is known.
     pub chi2_per_dof: f64,
-    /// What is left of each touch, in µm.
+    /// The residual of each touch, in µm.
     pub residual_um: Vec<f64>,
     /// Touches that are not like the others.
     pub unlike: Option<Rows>,
@@ -201,7 +201,7 @@ impl Fitted {
         weighted(&self.design.columns, weights, used)
     }
 
-    /// Takes the variance from what is left per degree of freedom, in units of the noise where that is known.
+    /// Takes the variance from the residual per degree of freedom, in units of the noise where that is known.
     pub(crate) fn level(&mut self, weights: &Weights, level: f64) {
         self.variance = match weights.noise {
             Noise::Residual => level,

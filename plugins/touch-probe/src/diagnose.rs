@@ -31,12 +31,12 @@ const MOST_ORDERS: usize = 5;
 const MOST_ADDED: usize = 9;
 /// Share of a column outside the span of those before it, below which it is none of its own.
 const INDEPENDENT: f64 = 1e-7;
-/// Amplitude of an order against what the second order makes of it, below which it is not believed: the latter is known to its
+/// Amplitude of an order against what the second order makes of it, below which it is not accepted: the latter is known to its
 /// size only.
 const SECOND_ORDER: f64 = 3.0;
 /// Directions that are nearer are one.
 const SAME_DEG: f64 = 0.5;
-/// Sectors of the ring in which what is left is summed.
+/// Sectors of the ring in which the residual is summed.
 const SECTORS: usize = 36;
 
 impl PointModel for TouchProbe {

@@ -3,7 +3,7 @@
 //! A touch triggers along the normal of the wall. Form of the ring turns the normal by F'/R, so that lobing is read at another direction:
 //! the reading gains L'·F'/R, and of the second order of each alone about F'²/(2R) and L'²/(2R). Orders p and q make orders p + q and
 //! |p − q|, each of about p·q/(2R) times the product of their amplitudes. Their phases are not modelled, so that this is
-//! part of the uncertainty, and no order below it is believed.
+//! part of the uncertainty, and no order below it is accepted.
 
 use crate::{
     config::TouchProbeConfig,

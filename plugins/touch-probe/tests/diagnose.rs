@@ -1,4 +1,4 @@
-//! The closed loop: every effect at small and at large size, clean campaigns, and strangers.
+//! The closed loop: every effect at small and at large size, clean campaigns, and unmodelled disturbances.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
@@ -164,7 +164,7 @@ fn the_machine_is_blind_where_the_probe_is_not_turned() {
 }
 
 #[test]
-fn strangers_are_unexplained_and_blame_nothing() {
+fn unmodelled_disturbances_are_unexplained_and_attributed_to_no_effect() {
     let strangers: [(&str, Change); 7] = [
         ("chip", |scenario, size| scenario.strangers.chip = Some([133.0, 8.0, 12.0 * size])),
         ("wide chip", |scenario, size| scenario.strangers.chip = Some([133.0, 20.0, 12.0 * size])),

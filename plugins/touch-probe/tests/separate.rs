@@ -9,7 +9,7 @@ use runout_core::stage::PointSeparator;
 
 /// Pre-travel, lobes, mean and ranges over many campaigns: three quarters of them with uneven directions.
 #[test]
-fn intervals_hold_the_truth_as_often_as_they_say() {
+fn intervals_cover_the_true_value_as_often_as_they_say() {
     let mut inside = [0_usize; 3];
     let mut all = [0_usize; 3];
     let campaigns = trials(200);

@@ -19,9 +19,9 @@ pub struct Campaign {
     pub kind: Kind,
     /// With what is wrong.
     pub config: SpindleConfig,
-    /// The same without it.
+    /// The campaign without what is wrong.
     pub sound: SpindleConfig,
-    /// What is wrong, as the loop would say it; of a stranger only its name.
+    /// What is wrong, as the loop would say it; of an unmodelled disturbance only its name.
     pub planted: Vec<Planted>,
     /// Whether the declared model has the exact geometry.
     pub second_order: bool,
@@ -162,7 +162,7 @@ const PAIRED: [&str; 7] = [
     "sensor-angle",
     "speed-ripple",
 ];
-/// Strangers.
+/// Unmodelled disturbances.
 pub const STRANGERS: [&str; 4] = ["dent", "backlash", "step", "slipped-probe"];
 
 /// Draws a campaign, of one layout or any; the same seed and index give the same.

@@ -1,5 +1,5 @@
 //! The blind benchmarks of the closed loop: simulated campaigns with something wrong that is not declared to the loop, from below
-//! what can be seen to large; two things wrong; nothing wrong; and strangers, which it does not know.
+//! what can be seen to large; two things wrong; nothing wrong; and unmodelled disturbances, which it does not know.
 //!
 //! [`draw`], [`judge`] and [`report`] are the spindle's. Measured points share one driver, [`points`]; a domain adds one file to
 //! [`domains`].
@@ -39,7 +39,7 @@ const KINDS: [Kind; 20] = {
     ]
 };
 
-/// What a campaign is for, and how many of its kind came before: each effect and stranger has its turn.
+/// What a campaign is for, and how many of its kind came before: each effect and unmodelled disturbance is drawn in turn.
 #[must_use]
 pub fn turn(index: u64) -> (Kind, usize) {
     let length = KINDS.len() as u64;

@@ -52,7 +52,7 @@ pub struct Row {
     pub false_effects: usize,
     /// With the verdict that noise only is left.
     pub at_the_floor: usize,
-    /// Intervals of the true parameter that hold it, and those stated.
+    /// Intervals that cover the true parameter, and those stated.
     pub held: [usize; 2],
     /// Their standard uncertainties.
     pub std: Vec<f64>,

@@ -40,7 +40,7 @@ pub struct Coverage {
     pub predictions: usize,
     /// Sum of squares of error over standard uncertainty.
     pub squares: f64,
-    /// Predictions whose 95 % interval holds the truth.
+    /// Predictions whose 95 % interval covers the true value.
     pub inside: usize,
     /// Sums of squares of the errors and of the standard uncertainties, in µm².
     pub sums_um2: [f64; 2],
@@ -61,7 +61,7 @@ impl Coverage {
         self.squares / self.predictions as f64
     }
 
-    /// Share of the 95 % intervals that hold the truth.
+    /// Share of the 95 % intervals that cover the true value.
     #[must_use]
     pub fn share_inside(&self) -> f64 {
         self.inside as f64 / self.predictions as f64

@@ -33,7 +33,7 @@ pub(crate) fn check(words: &[&str]) -> Outcome {
     findings.verdict()
 }
 
-/// The same without the graphs, for a longer list of checks.
+/// Fails on what the picture does not have, without printing the graphs: for a longer list of checks.
 pub(crate) fn check_quietly() -> Outcome {
     Findings::of(&root())?.verdict()
 }

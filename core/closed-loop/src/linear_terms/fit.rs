@@ -366,7 +366,7 @@ impl Fit for LinearFit {
     }
 }
 
-/// What is left of a group of points, of which those are free that are not needed to fit them: n − tr Q_gᵀQ_g. The residual of the
+/// The residual of a group of points, of which those are free that are not needed to fit them: n − tr Q_gᵀQ_g. The residual of the
 /// fit without the group would be large beside a bad group, too.
 fn group(points: &[usize], residual: &[f64], joint: &Basis) -> Group {
     let squares = points.iter().map(|point| residual[*point].powi(2)).sum();

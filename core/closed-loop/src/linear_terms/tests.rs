@@ -76,7 +76,7 @@ fn the_fit_is_least_squares() {
         assert!((found - expected).abs() < 1e-10);
     }
     assert!((remainder.noise_floor - 0.02 * (88.0_f64 / 90.0).sqrt()).abs() < 1e-15);
-    // Standard uncertainty of the level: σ √[(AᵀA)⁻¹]₁₁, raised by what is left.
+    // Standard uncertainty of the level: σ √[(AᵀA)⁻¹]₁₁, raised by the residual.
     let matrix = DMatrix::from_fn(90, 2, |row, column| columns[column][row]);
     let inverse = matrix.tr_mul(&matrix).try_inverse().unwrap();
     let expected = 0.02 * (inverse[(0, 0)] * remainder.chi2_per_dof()).sqrt();

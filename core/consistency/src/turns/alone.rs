@@ -15,7 +15,7 @@ const BESIDE: usize = 2;
 /// Share of the turns at each end that a change is stated from.
 const ENDS: usize = 8;
 
-/// Looks at every order that no change of the whole explains.
+/// Evaluates every order that no change of the whole explains.
 pub(super) fn look(table: &TurnTable, spectrum: &Spectrum, course: &mut TurnCourse) {
     let (ratios, limit) = ratios(spectrum);
     let explained = !course.orders.is_empty() || course.phase_std_rad > 0.0 || course.size_std > 0.0;

@@ -20,7 +20,7 @@ const ROUNDS: usize = 6;
 /// The test of the phase.
 const PHASE: &str = "phase of all orders";
 
-/// Looks at phase and size.
+/// Evaluates phase and size.
 pub(super) fn look(table: &TurnTable, course: &mut TurnCourse) {
     let [phase, size] = Parts::of(table).map(|parts| parts.and_then(|parts| parts.shared(table.rows())));
     if let Some(size) = size {

@@ -16,7 +16,7 @@ const REACH: f64 = 1.0;
 const MOST_TURNS: usize = 3;
 /// Amplitude at orders that a part has not, beside those that it has.
 const EMPTY: f64 = 0.02;
-/// The same in standard errors, where these are larger.
+/// Amplitude at orders that a part has not, in standard errors, where these are larger.
 const NOISE: f64 = 4.0;
 /// Share of the power of the order that an eccentricity stands at.
 const ECCENTRIC: f64 = 0.5;

@@ -10,7 +10,7 @@ use crate::{
 /// A turn is named where it is so many times as far off as the farthest of the others: asynchronous motion swells over several turns.
 const APART: f64 = 2.0;
 
-/// Looks at all low orders of each turn together. Means of neighbouring turns are left alone: no single turn stands out of them.
+/// Evaluates all low orders of each turn together. Means of neighbouring turns are left alone: no single turn stands out of them.
 pub(super) fn look(table: &TurnTable, course: &mut TurnCourse) {
     // What all orders share is said already, and is larger in the turns at its ends.
     if table.together > 1 || !course.is_steady() {

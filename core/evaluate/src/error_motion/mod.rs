@@ -97,7 +97,7 @@ impl ErrorMotion<'_> {
         let z_mm = first.projection.z_mm + self.z_mm;
         let mut values = Vec::new();
         for direction in directions(&spreads) {
-            // Setups that do not tell a direction, as sensors that all look along another one, have no part in it.
+            // Setups in which a direction is not observable, as all sensors measure along another one, have no part in it.
             let told: Vec<&Spread> =
                 spreads.iter().copied().filter(|spread| spread.in_direction(direction).is_some()).collect();
             if direction.is_axial() {
@@ -211,7 +211,7 @@ impl ErrorMotion<'_> {
         })
     }
 
-    /// Standard uncertainty of a range over turns from the form's slope: nothing tells it from motion along the sensor. It is
+    /// Standard uncertainty of a range over turns from the form's slope: it is not distinguishable from motion along the sensor. It is
     /// at most the slope times what `across` is of motion across, in every sensor of the combination, and as likely to be
     /// anything below.
     fn carried(&self, direction: Direction, spreads: &[&Spread], across: fn(&Spread, Direction) -> f64) -> f64 {

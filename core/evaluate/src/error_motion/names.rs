@@ -68,8 +68,8 @@ fn along_axis(faces: &[FacePlace]) -> impl Iterator<Item = String> {
     std::iter::once(Direction::Axial).chain(faces.iter().copied().map(Direction::Face)).map(chosen_id)
 }
 
-/// The same of an axis at standing positions, which have no turns: no asynchronous and total values. The axis may lie along x or y, so that
-/// z is across it.
+/// Every value that there may be of an axis at standing positions, with those in chosen directions. Such an axis has no turns: no
+/// asynchronous and total values. It may lie along x or y, so that z is across it.
 #[must_use]
 pub fn standing_symbols(lines: &[Azimuth], faces: &[FacePlace]) -> Vec<KnownValue> {
     let mut known = Known::default();
@@ -142,7 +142,7 @@ pub(super) fn id(direction: Direction) -> &'static str {
     }
 }
 
-/// The same with the machine's letters.
+/// Id of a direction with the machine's letters; of a chosen one its own id.
 pub(super) fn letter_id(direction: Direction, [x, y, _]: Letters) -> String {
     match direction {
         Direction::X => format!("radial-{x}"),

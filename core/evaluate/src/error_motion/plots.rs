@@ -1,4 +1,4 @@
-//! Error motion to look at: the polar plot of all turns, and the spectrum of what repeats and what does not.
+//! Plots of error motion: the polar plot of all turns, and the spectrum of what repeats and what does not.
 
 use super::{
     CENTRE, ErrorMotion,

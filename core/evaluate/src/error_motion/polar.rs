@@ -104,7 +104,8 @@ impl Synchronous {
         Self::from_order(lowest, separation, projection, direction, z_mm)
     }
 
-    /// The same, of orders from this one on: from 1, with the part of 1/rev that turns against the spindle.
+    /// Motion at `z_mm` along the spindle, of orders from `lowest` on: from 1, with the part of 1/rev that turns against the
+    /// spindle. `None` where the separation does not know it.
     pub(crate) fn from_order(
         lowest: usize,
         separation: &Separation,

@@ -48,7 +48,7 @@ impl Synchronous {
     /// The plot from a centre, with errors of orders from `lowest` on; `None` where the centre is not determined.
     pub(super) fn seen(&self, centre: Centre, angles: usize, lowest: usize, seed: u64) -> Option<AboutCentre> {
         let mut points = Points::default();
-        // Errors raise crests between the given angles too. Draws on angles that show them tell the error as well as draws on
+        // Errors raise crests between the given angles too. Draws on angles that show them give the error as well as draws on
         // those where the range is sought, from which it differs by little.
         let count = drawn_angles(DRAWN_POINTS_A_WAVE, self.crest_orders(), self.band[1] + 1);
         let (seen, finely) =

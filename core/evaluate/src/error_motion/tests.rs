@@ -234,12 +234,12 @@ fn errors_of_x_and_y_go_together() {
     assert!((0.2..0.5).contains(&known.std), "{known:?}");
 }
 
-/// 95 % intervals of synchronous values hold the truth where noise of high orders adds a good part of what is read: tilts of
+/// 95 % intervals of synchronous values cover the true value where noise of high orders adds a good part of what is read: tilts of
 /// 1 µrad rms that fall with order⁻¹ to 20 and of 0.03 µrad with order⁻², errors of 0.1 and 0.3 µrad at every angle in orders to 359, which have two
-/// of the angles on a wave. As they hold two kinds of draws, they are wider than they need be; they may not be twice as wide as what was found
+/// of the angles on a wave. As they contain two kinds of draws, they are wider than they need be; they may not be twice as wide as what was found
 /// errs.
 #[test]
-fn intervals_of_synchronous_values_hold_the_truth() {
+fn intervals_of_synchronous_values_cover_the_true_value() {
     const HIGHEST: usize = 359;
     let count = trials(300);
     let mut random = ChaCha8Rng::seed_from_u64(22);
@@ -278,7 +278,7 @@ fn intervals_of_synchronous_values_hold_the_truth() {
                 (0..4).for_each(|motion| covariance[16 * order + 5 * motion] = Complex64::from(told));
             }
             noisy.motion_covariance = Some(covariance);
-            // Forty squares tell the noise of each five orders.
+            // The noise of each five orders is known from forty squares.
             noisy.freedom = 8;
             let (truth, found) =
                 (values(&exact, &profiles, LSC), values_of(&format!("s{trial}"), &noisy, &profiles, LSC));
@@ -334,7 +334,7 @@ fn what_is_lost_is_said_and_left_out() {
 }
 
 #[test]
-fn setups_tell_the_uncertainty_of_a_range() {
+fn setups_give_the_uncertainty_of_a_range() {
     assert_eq!(between_setups(&[1.0], 0.0), None);
     // By hand: mean 1.1, standard deviation 0.1, t = 4.302653 for 2 degrees of freedom, √(4/3).
     let known = between_setups(&[1.0, 1.1, 1.2], 0.0).unwrap();

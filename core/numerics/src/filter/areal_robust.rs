@@ -17,7 +17,7 @@ const HIGHEST: usize = 4;
 const HIGHEST_POWER: i32 = 4;
 
 /// The robust areal Gaussian low-pass (ISO 16610-71) of a map: around each point a polynomial of degree 2 is fitted under the
-/// Gaussian's weights, again and again with Tukey's biweight of what is left, as
+/// Gaussian's weights, again and again with Tukey's biweight of the residual, as
 /// [`robust_gaussian`](super::robust_gaussian) does along a profile. Round a closed map it is circular; ends keep a curvature.
 /// Missing points have no say and stay missing. The cut-off is a wavelength along the surface, above 0; `weights` of the
 /// result are those of the last iteration, `[row][column]`.
@@ -92,7 +92,7 @@ impl Fit {
         sums
     }
 
-    /// The same along the columns, of one row.
+    /// Sums along the columns, of one row, of a kernel times what is beside a point.
     fn over_column(&self, values: &[f64], power: usize, row: usize, sums: &mut [f64]) {
         let (reach, kernel) = (self.along.reach, &self.along.powers[power]);
         sums.fill(0.0);

@@ -87,7 +87,7 @@ mod tests {
             let wave = DVector::from_fn(COUNT, |point, _| at(point));
             let Some(filtered) = system.clone().lu().solve(&wave) else { panic!("a regular system") };
             let share = filtered.dot(&wave) / wave.dot(&wave);
-            // The limit of dense points: (π·20/180)²/3 is 4 %, of which the cut-off's own share is taken back.
+            // The limit of dense points: (π·20/180)²/3 is 4 %, from which the cut-off's own share is subtracted.
             let expected = Kind::Spline.low_pass(f64::from(order), cutoff);
             assert!((share - expected.re).abs() < 0.01 && expected.im == 0.0, "{order}: {share} {expected}");
         }

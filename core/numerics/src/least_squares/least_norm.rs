@@ -18,7 +18,7 @@ pub struct LeastNorm {
     pub covariance: DMatrix<f64>,
     /// Which parameters the data do not determine.
     pub lost: Vec<bool>,
-    /// What is left of the values.
+    /// The residual of the values.
     pub residual: Vec<f64>,
     /// Values less independent parameters.
     pub dof: usize,

@@ -2,7 +2,7 @@
 //!
 //! All of them are written and synced under temporary names first. A journal `.runout-….journal` that names them all is the point of no
 //! return: before it nothing has changed, from it on the publication is completed, by the next run where this one is killed. A rename that
-//! the file system refuses takes back those before it.
+//! the file system refuses undoes those before it.
 
 use std::{
     ffi::{OsStr, OsString},
@@ -89,7 +89,7 @@ pub(super) fn publish(files: &[(&Path, &Path)]) -> Result<()> {
         });
         if let Some(renamed) = renamed {
             for (temporary, destination, previous) in done[..renamed].iter().rev() {
-                // What cannot be taken back stays new; the error names the place.
+                // What cannot be undone stays new; the error names the place.
                 let _ = fs::rename(destination, temporary);
                 let _ = previous.as_ref().map(|previous| fs::rename(previous, destination));
             }
@@ -132,7 +132,7 @@ pub(super) fn publish_last_after_others(files: &[(&Path, &Path)]) -> Result<()> 
     });
     if let Err(error) = outcome.and_then(|()| sync_all(others)).and_then(|()| named(last)) {
         for (temporary, destination) in others[..renamed].iter().rev() {
-            // What cannot be taken back stays, without the last file.
+            // What cannot be undone stays, without the last file.
             let _ = fs::rename(destination, temporary);
         }
         return Err(error);

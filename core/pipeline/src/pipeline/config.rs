@@ -73,7 +73,7 @@ pub struct Pipeline {
     pub effects: EffectCatalogue,
     /// In the order configured.
     pub exporters: Vec<Box<dyn Exporter>>,
-    /// The same for the results of a diagnosis: below `diagnosed/`, or where `[diagnose] out` says.
+    /// Exporters of the results of a diagnosis, in the order configured: below `diagnosed/`, or where `[diagnose] out` says.
     pub diagnosed: Vec<Box<dyn Exporter>>,
     /// What `check` asks besides.
     pub checks: Vec<Box<dyn Check>>,

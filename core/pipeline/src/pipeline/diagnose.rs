@@ -56,7 +56,7 @@ pub struct Diagnosed {
     pub summary: Summary,
 }
 
-/// The same, with the result of the final model.
+/// Runs the closed loop as [`diagnose`] does, and gives the result of its final model too.
 ///
 /// # Errors
 /// As [`diagnose`] has.

@@ -78,7 +78,7 @@ impl Sources {
         Self::from_text(&path.display().to_string(), &read_text(path)?, folder, overrides, include_key)
     }
 
-    /// The same from a text; paths in it are relative to `folder`.
+    /// Reads a text, with overrides of the form `key.path=value` and the file that `include_key` names; paths in it are relative to `folder`.
     ///
     /// # Errors
     /// When the text is not TOML or an included file cannot be read.

@@ -140,7 +140,7 @@ impl RecordReader<'_> {
         inputs
     }
 
-    /// A capture as it is read, its turns counted and conditioned; every sample is looked at before anything else touches it.
+    /// A capture as it is read, its turns counted and conditioned; every sample is examined before any other use.
     fn recorded<'b>(
         &'b self,
         threads: NonZeroUsize,

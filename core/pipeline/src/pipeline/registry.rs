@@ -64,7 +64,7 @@ pub struct Plugin<S> {
 /// From a stage's table to the stage.
 type Build<S> = Box<dyn Fn(&Table, &Context) -> Result<S, Fault> + Send + Sync>;
 
-/// What a stage's check may look at besides its own keys.
+/// What a stage's check may use besides its own keys.
 #[derive(Debug, Clone, Copy)]
 pub struct Context<'a> {
     /// The folder that relative paths start from.
@@ -120,7 +120,7 @@ impl<S> Plugin<S> {
         Self { name, about, former: false, schema: inline::<C>, build: Box::new(build) }
     }
 
-    /// The same plugin under a name that it had before: found by it, and in no list.
+    /// A plugin under a name that it had before: it is found by that name and is in no list.
     #[must_use]
     pub fn former<C: StageConfig<Stage = S>>(name: &'static str) -> Self {
         Self { name, former: true, ..Self::of::<C>() }

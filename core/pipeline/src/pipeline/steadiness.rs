@@ -39,7 +39,7 @@ struct SensorCreep {
 }
 
 impl Steadiness {
-    /// Looks at the levels of a station's turns.
+    /// Evaluates the levels of a station's turns.
     pub(crate) fn take(&mut self, station: &str, profiles: &[Profile], rig: &Rig) {
         self.stations += 1;
         self.sensors.resize(rig.sensors.len(), SensorCreep::default());

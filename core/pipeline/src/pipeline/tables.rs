@@ -94,13 +94,13 @@ impl StationTables {
         }
     }
 
-    /// The same for so many stations: of many, each second, third, … has tables of error motion turn by turn.
+    /// The tables for so many stations: of many, each second, third, … has tables of error motion turn by turn.
     #[must_use]
     pub fn of_stations(self, stations: usize) -> Self {
         Self { every: stations.div_ceil(turn_tables::STATIONS).max(1), ..self }
     }
 
-    /// The same with the residual of each averaged reading.
+    /// Adds the residual of each averaged reading.
     pub(super) fn with_residuals(&mut self) {
         self.with_residuals = true;
     }

@@ -11,7 +11,7 @@ use super::{PointColumn, Points};
 const HIDDEN: f64 = 0.6;
 /// Fewest degrees of freedom of repeats that show it.
 const FEWEST: usize = 8;
-/// Rows that are looked at, at most: a map has a million heights, and each row takes memory.
+/// Rows that are examined, at most: a map has a million heights, and each row takes memory.
 const MOST_ROWS: usize = 50_000;
 /// Part of a step by which readings may be off it.
 const ON_STEP: f64 = 1e-6;

@@ -10,7 +10,7 @@ use super::{PointColumn, Points, coarse::coarser_than_noise};
 
 /// Readings in a row that come again elsewhere are a copy from so many on.
 const STRETCH: usize = 8;
-/// The same of a column whose resolution is coarse: sound readings come again there.
+/// So many readings in a row that come again elsewhere in a column of coarse resolution are a copy: fewer also come again in sound readings.
 const COARSE_STRETCH: usize = 40;
 /// A resolution is coarse from this share of the range on.
 const COARSE: f64 = 1e-3;

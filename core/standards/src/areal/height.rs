@@ -103,7 +103,7 @@ impl NullaryFnOnce for Row<'_> {
 
 /// Heights minus their mean; missing ones NaN.
 pub(super) fn centred(heights_um: &[f64]) -> Vec<f64> {
-    // A second round takes back the rounding of the first.
+    // A second round corrects the rounding of the first.
     let first = vectorised(Mean(heights_um, 0.0));
     let mean = first + vectorised(Mean(heights_um, first));
     heights_um.iter().map(|height| if height.is_finite() { height - mean } else { f64::NAN }).collect()

@@ -1,4 +1,4 @@
-//! Points of a wall in separate columns, so that a look at all of them goes through vector registers.
+//! Points of a wall in separate columns, so that all of them are evaluated in vector registers.
 
 #![allow(clippy::inline_always, reason = "see runout_numerics::lanes")]
 
@@ -43,7 +43,7 @@ impl About {
         self.with_slopes(point).0
     }
 
-    /// The same, and its derivatives by the axis.
+    /// Distance of a point from the axis less R, and its derivatives by the axis.
     #[inline(always)]
     pub(crate) fn with_slopes(&self, [u, v, level, zeta]: [f64; 4]) -> (f64, Axis) {
         let Self { axis, slopes: [a, b], length, radius_um: radius, half_um } = *self;
@@ -100,7 +100,7 @@ impl Columns {
         deviations
     }
 
-    /// The same into memory that is there.
+    /// Writes the deviation of each point from an axis to `deviations`; NaN where it is missing.
     pub(crate) fn fill(&self, about: &About, deviations: &mut Vec<f64>) {
         deviations.resize(self.len(), 0.0);
         vectorised(Deviations { columns: self, about, out: deviations });

@@ -3,7 +3,7 @@
 use super::{Cylinder, Points, Reference, Section, Values, zone::Zone};
 use crate::near::{DeviationSpread, NearContacts};
 
-/// A wall about one reference cylinder. Only points that may come to touch it are looked at, where that is certain.
+/// A wall about one reference cylinder. Only points that may come to touch it are evaluated, where that is certain.
 #[derive(Debug, Clone)]
 pub struct Disturbed {
     reference: Reference,
@@ -11,7 +11,7 @@ pub struct Disturbed {
     near: NearContacts,
     /// Direction, height, section and place in it of the points near.
     at: Vec<((f64, f64), f64, [usize; 2])>,
-    /// The cylinder about the wall itself, and heights between which it is looked at.
+    /// The cylinder about the wall itself, and heights between which it is evaluated.
     cylinder: Cylinder,
     about: Values,
     heights_mm: [f64; 2],
@@ -66,7 +66,7 @@ impl Disturbed {
     }
 
     /// Values of the wall with errors of at most `largest_um` in it. About other cylinders than LSCY, CYLq is that of the
-    /// points looked at, or NaN.
+    /// points evaluated, or NaN.
     #[must_use]
     pub fn values(&mut self, drawn: &[Section], largest_um: f64) -> Option<Values> {
         match self.reference {
@@ -83,7 +83,7 @@ impl Disturbed {
         }
     }
 
-    /// From the points looked at; `None` where others could touch.
+    /// From the points evaluated; `None` where others could touch.
     fn of_near(&self, drawn: &[Section], largest_um: f64) -> Option<Values> {
         let near = self.at.iter().map(|(direction, z_mm, [section, point])| {
             let form_um = drawn.get(*section).and_then(|section| section.form_um.get(*point));

@@ -10,7 +10,7 @@ use runout_numerics::{chebyshev::Chebyshev, cloud::Cloud};
 pub struct Generatrices {
     /// Straightness STRt of each about its least-squares line LSLI (ISO 12780-1); NaN with fewer than three points.
     pub strt_lsli_um: Vec<f64>,
-    /// The same about its minimum-zone line MZLI.
+    /// Straightness STRt of each about its minimum-zone line MZLI (ISO 12780-1); NaN with fewer than three points.
     pub strt_mzli_um: Vec<f64>,
     /// Local taper in the plane of each angle and the opposite one (ISO 12180-1): half the difference of the diameters
     /// between the least-squares lines of both at the ends of the wall, without sign; NaN where a line is not known.
@@ -94,7 +94,7 @@ pub struct MedianLine {
     pub z_mm: Vec<f64>,
     /// Centre of each section's LSCI; NaN where it is not known.
     pub x_um: Vec<f64>,
-    /// The same along y.
+    /// Centre of each section's LSCI along y; NaN where it is not known.
     pub y_um: Vec<f64>,
     /// Coaxiality of each section with LSCY: twice the distance of its centre from the axis, in the section's plane.
     pub coaxiality_um: Vec<f64>,

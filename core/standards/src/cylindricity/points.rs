@@ -62,7 +62,7 @@ impl Points {
         Self::of(radius_mm, sections.iter().map(|section| section.form_um.len()).sum(), points)
     }
 
-    /// So many points, looked at twice.
+    /// So many points, passed over twice.
     pub(super) fn of(radius_mm: f64, count: usize, points: impl Iterator<Item = Place> + Clone) -> Self {
         let radius_um = 1e3 * radius_mm;
         let heights = points.clone().filter(|(_, z, form)| is_there(*z, *form)).map(|(_, z, _)| z);

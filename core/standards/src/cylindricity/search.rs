@@ -1,4 +1,4 @@
-//! Minimum zone, inscribed and circumscribed cylinder: exchange among few points, then a look at all.
+//! Minimum zone, inscribed and circumscribed cylinder: exchange among few points, then an evaluation of all.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -11,7 +11,7 @@ use runout_numerics::{
     cloud::Cloud,
 };
 
-/// Blocks of neighbouring points, of which the highest and lowest are looked at first.
+/// Blocks of neighbouring points, of which the highest and lowest are evaluated first.
 const BLOCKS: usize = 512;
 /// All of so few points are chosen.
 const FEW: usize = 256;
@@ -19,13 +19,13 @@ const FEW: usize = 256;
 const SHARE: f64 = 1e-3;
 /// Multipliers of the region's limits above this: the axis is not stationary.
 const ADRIFT: f64 = 1e-3;
-/// Linear problems of one set of chosen points, looks at all points, and steps of Newton's method, before giving up.
+/// Linear problems of one set of chosen points, evaluations of all points, and steps of Newton's method, before giving up.
 const MOST_STEPS: usize = 200;
 const MOST_LOOKS: usize = 100;
 const MOST_NEWTON: usize = 12;
 
 /// Downhill from `start`: the deviations of some points are made linear in the axis, the linear problem is solved exactly
-/// by exchange within a region that shrinks where the true merit does not follow, and all points are looked at for those
+/// by exchange within a region that shrinks where the true merit does not follow, and all points are evaluated for those
 /// that the chosen ones missed. (Sequential linear programming: Fletcher, *Practical Methods of Optimization*, 1987, 14.4,
 /// with his second-order correction.) Where fewer contacts than unknowns hold the axis and curvature does the rest, Newton's
 /// method solves the contacts' balance (Hald, Madsen, *Math. Program.* 20 (1981) 49).
@@ -92,7 +92,7 @@ struct Search<'a> {
     /// Points that may touch, and these points themselves.
     chosen: Vec<usize>,
     held: Columns,
-    /// Of all points, about the axis last looked at; its memory is used again.
+    /// Of all points, about the axis last evaluated; its memory is used again.
     deviations: Vec<f64>,
     chebyshev: Chebyshev<4, 6>,
 }

@@ -4,7 +4,7 @@ use super::{Cylinder, Points, Reference, Section, Undetermined, Values};
 use crate::{extremes::extremes, near::DeviationSpread};
 use runout_numerics::{Complex64, interpolation::Curve};
 
-/// Looks at all points before giving up; two or three are usual.
+/// Evaluations of all points before giving up; two or three are usual.
 const MOST_LOOKS: usize = 20;
 
 /// A wall of sections Re Σ cₙ e^{inθ}, for several of its reference cylinders.

@@ -2,7 +2,7 @@
 //!
 //! NearContacts the axis of MZCY every deviation is linear in the axis, which errors move by about their own size; errors times
 //! the form, over R, are neglected. The zone with errors is then the solution of one linear problem, sought among the points that are near
-//! the ends about the axis of the last one; a look at all points shows whether others touch.
+//! the ends about the axis of the last one; an evaluation of all points shows whether others touch.
 
 use super::{Cylinder, Points, Section, Values};
 use runout_numerics::{

@@ -62,7 +62,8 @@ impl<'a> Heights<'a> {
         self.with(&DrawnErrors::new(&vec![0.0; self.undisturbed.len()]), &mut Sum::default())
     }
 
-    /// The same with errors added.
+    /// The lowest and the highest of the heights with errors added and with crests between the angles, and the root mean square
+    /// of them; NaN of nothing.
     #[must_use]
     pub fn with(&self, errors: &DrawnErrors, sum: &mut Sum) -> ([f64; 2], f64) {
         let count = self.undisturbed.len();

@@ -52,7 +52,7 @@ impl<'a> CircleSearch<'a> {
         Self { reference, between, angles, radius_mm, search: Warm::new(reference), last: None }
     }
 
-    /// The circle of the next profile. A profile far from a circle may have several, among which the last one tells nothing.
+    /// The circle of the next profile. A profile far from a circle may have several, among which the last one decides nothing.
     fn circle(&mut self, points: &Points) -> Option<Circle> {
         let warm = match (&mut self.search, self.last) {
             (Some(search), Some((count, last_um))) if count == points.len() && !search::is_wide(points) => {
@@ -119,7 +119,7 @@ impl Disturbed<'_> {
     }
 
     /// Values of the profile with errors in it. RONq is that of all points about LSCI of an interrupted profile, or where crests are at the
-    /// angles; else that of the points looked at, or NaN.
+    /// angles; else that of the points evaluated, or NaN.
     pub fn values(&mut self, drawn: &DrawnErrors) -> Option<Values> {
         if self.reference == Reference::LeastSquares {
             return self.of_all(drawn);
@@ -128,7 +128,7 @@ impl Disturbed<'_> {
         self.of_near(drawn).or_else(|| anew(self)).or_else(|| self.of_all(drawn))
     }
 
-    /// From the points looked at; `None` where others could touch.
+    /// From the points evaluated; `None` where others could touch.
     fn of_near(&mut self, drawn: &DrawnErrors) -> Option<Values> {
         let (form_um, step_rad, between) = (self.form_um, self.step_rad(), self.between);
         let heights =
@@ -150,7 +150,7 @@ impl Disturbed<'_> {
         self.near.suffice(ends_um, moved, largest_um).then_some(values)
     }
 
-    /// The same, sought anew.
+    /// From the contacts of the last draw, by a new search for the circle; `None` where others could touch.
     fn anew(&mut self, largest_um: f64) -> Option<Values> {
         let circle = self.points.reference(self.reference)?;
         let values = self.points.values(&circle);

@@ -11,7 +11,7 @@ use runout_numerics::{
 const LANES: usize = 8;
 /// Sums over the points: count, x, y, xx, xy, yy of the directions, and d, dx, dy, dd with the deviations.
 type Sums = [f64; 10];
-/// Points that the first guess looks at, at most about.
+/// Points that the first guess uses, at most about.
 const GLANCE: usize = 1024;
 const MOST_STEPS: usize = 100;
 

@@ -38,7 +38,7 @@ pub use series::{Located, Series, between_angles};
 pub struct Circle {
     /// Its centre from the origin of angles (of coordinates, for points of the plane).
     pub x_um: f64,
-    /// The same along y.
+    /// Its centre along y, from the origin of angles (of coordinates, for points of the plane).
     pub y_um: f64,
     /// Its radius less [`Points::radius_um`], without the rounding that the radius itself would bring.
     pub deviation_um: f64,

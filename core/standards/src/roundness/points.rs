@@ -38,7 +38,7 @@ impl Angles {
         self.sin.iter().copied().zip(self.cos.iter().copied())
     }
 
-    /// The same as [`equal`](Self::equal), computed once and shared by all that ask on this thread.
+    /// `count` equal steps from 0 on, computed once and shared by all that ask on this thread.
     #[must_use]
     pub fn shared(count: usize) -> Rc<Self> {
         SHARED.with_borrow_mut(|shared| {

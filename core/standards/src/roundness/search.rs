@@ -1,4 +1,4 @@
-//! Minimum zone and maximum inscribed circle: exchange among few points, then a look at all.
+//! Minimum zone and maximum inscribed circle: exchange among few points, then an evaluation of all.
 
 use super::{Circle, Points, Undetermined, equal_heights::equal_heights, least_squares::guess};
 use runout_numerics::{
@@ -6,18 +6,18 @@ use runout_numerics::{
     cloud::Cloud,
 };
 
-/// Blocks of neighbouring points, of which the highest and lowest are looked at first.
+/// Blocks of neighbouring points, of which the highest and lowest are evaluated first.
 const BLOCKS: usize = 64;
 /// All of so few points are chosen.
 const FEW: usize = 128;
-/// Steps downhill among the chosen points, and looks at all points, before giving up.
+/// Steps downhill among the chosen points, and evaluations of all points, before giving up.
 const MOST_STEPS: usize = 200;
 /// Deviations from this share of the radius on may have several local optima.
 const WIDE: f64 = 0.02;
 /// Places in each direction of the grid on which starts are sought, and starts at most.
 const GRID: usize = 25;
 const MOST_STARTS: usize = 24;
-/// Triples of so few points are all looked at.
+/// Triples of so few points are all evaluated.
 const FEW_TRIPLES: usize = 24;
 /// Inscribed circles that are compared where the profile has two nearly opposite contacts.
 const MOST_NEIGHBOURS: usize = 16;
@@ -259,7 +259,7 @@ fn slopes<const N: usize>(points: &Points, goal: Goal, place: &[f64; 2], low: f6
     slopes
 }
 
-/// The same of a zone about a place.
+/// Derivatives of the merit of a zone about a place: by the place, and by the upper and lower bound of the heights.
 pub(super) fn zone_slopes(points: &Points, place: &[f64; 2]) -> [f64; 4] {
     let (low, high) = points.cloud.extremes(0..points.len(), place);
     slopes(points, Goal::Zone, place, low, high)

@@ -6,7 +6,7 @@ use super::{Angles, Circle, Points, Reference, Undetermined, Values};
 use crate::extremes::extremes;
 use runout_numerics::{Complex64, interpolation::Curve};
 
-/// Looks at all angles before giving up; two or three are usual.
+/// Evaluations of all angles before giving up; two or three are usual.
 const MOST_LOOKS: usize = 20;
 
 /// The reference circle and the values about it of the profile Re Σ cₙ e^{inθ} (`harmonics`, from order 0, in µm) about a circle of
@@ -30,7 +30,7 @@ pub struct Located {
     pub circle: Circle,
     /// Angle of the highest point, in rad from 0 to 2π, and its deviation from the circle, in µm.
     pub peak: [f64; 2],
-    /// The same of the lowest point.
+    /// Angle of the lowest point, in rad from 0 to 2π, and its deviation from the circle, in µm.
     pub valley: [f64; 2],
 }
 

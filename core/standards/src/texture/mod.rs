@@ -190,8 +190,8 @@ pub fn around(form_um: &[f64], radius_mm: f64, settings: &Settings) -> Texture {
     closed(form_um, radius_mm, settings, true)
 }
 
-/// The same without what elements and the material ratio curve give (Rsm, Rc, Rk, Rpk, Rvk, Rmrk1, Rmrk2, Rdc are NaN), in
-/// a fraction of the time.
+/// Texture of a closed profile on equal angles of a part with a radius, without what elements and the material ratio curve give
+/// (Rsm, Rc, Rk, Rpk, Rvk, Rmrk1, Rmrk2, Rdc are NaN), in a fraction of the time.
 #[must_use]
 pub fn heights_around(form_um: &[f64], radius_mm: f64, settings: &Settings) -> Texture {
     closed(form_um, radius_mm, settings, false)

@@ -27,7 +27,7 @@ pub struct Circle {
     pub is_refuted: bool,
     /// Angle in degrees and deviation of the highest point about it.
     pub peak: [f64; 2],
-    /// The same of the lowest point.
+    /// Angle in degrees and deviation of the lowest point about it.
     pub valley: [f64; 2],
     /// Distance of the centre from the axis, and the angle to it in degrees.
     pub eccentricity: [f64; 2],

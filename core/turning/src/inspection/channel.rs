@@ -1,4 +1,4 @@
-//! What is known of one channel so far, and the look at its next samples.
+//! What is known of one channel so far, and the check of its next samples.
 
 use std::ops::Range;
 
@@ -88,7 +88,7 @@ impl Channel {
         }
     }
 
-    /// Looks at `frames` of the block, one sample after the other; `past` are the frames before the block.
+    /// Examines `frames` of the block, one sample after the other; `past` are the frames before the block.
     pub(super) fn look(
         &mut self,
         index: usize,
@@ -215,7 +215,7 @@ fn mark(defects: &mut Vec<Defect>, channel: usize, kind: DefectKind, samples: Ra
     }
 }
 
-/// A look at frames of a block, by all channels.
+/// The check of frames of a block, by all channels.
 pub(super) struct Look<'a> {
     pub(super) channels: &'a mut [Channel],
     pub(super) rule: &'a Rule,
@@ -228,8 +228,8 @@ pub(super) struct Look<'a> {
 }
 
 impl LaneWork for Look<'_> {
-    /// Nearly always a glance at the extremes of all frames is enough: no value that is not finite, at a limit, or
-    /// equal to the one before (integers: to many before). Only where it is not, each channel is looked at sample by sample.
+    /// Nearly always the extremes of all frames are enough: no value that is not finite, at a limit, or
+    /// equal to the one before (integers: to many before). Only where it is not, each channel is examined sample by sample.
     #[inline(always)]
     #[allow(clippy::inline_always, reason = "see LaneWork")]
     fn lanes<A: Arithmetic, const C: usize>(&mut self, offset: usize) {

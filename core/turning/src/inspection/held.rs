@@ -9,14 +9,14 @@ pub struct HeldChannel {
     pub samples: usize,
 }
 
-/// Frames that are looked at, at most and at least.
+/// Frames that are examined, at most and at least.
 pub(super) const FRAMES: [usize; 2] = [256, 4096];
 /// Share of the samples that are equal to the one before, from which on readings are held.
 const EQUAL: f64 = 0.4;
 /// A change of so many of the finest steps is none of a coarse converter, whose readings stand still by themselves.
 const STEPS: f64 = 8.0;
 
-/// Looks at the first frames of a capture.
+/// Examines the first frames of a capture.
 pub(super) fn held(samples: &[f64], channels: usize) -> Vec<HeldChannel> {
     let one = |channel: usize| {
         let readings = || samples.iter().skip(channel).step_by(channels).take(FRAMES[1]);

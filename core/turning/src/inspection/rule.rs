@@ -13,7 +13,7 @@ pub(super) enum Rule {
         shortest: u64,
         /// Of any run.
         pegged: u64,
-        /// Of the approach that is looked at.
+        /// Of the approach that is examined.
         approach: u64,
     },
     /// Not at all.

@@ -78,7 +78,7 @@ pub struct Bearing {
     pub id: String,
     /// Elements that pass a point of the outer ring, per revolution of the shaft.
     pub bpfo: f64,
-    /// The same of the inner ring.
+    /// Elements that pass a point of the inner ring, per revolution of the shaft.
     pub bpfi: f64,
     /// Turns of an element about its own axis.
     pub bsf: f64,

@@ -59,7 +59,7 @@ struct Walk {
     /// Entries of a leaf and of an inner node of a group's tree, half of them.
     leaf: usize,
     inner: usize,
-    /// The same of a node of a tree of chunks.
+    /// Half of the entries of a node of a tree of chunks.
     chunk: usize,
     found: Vec<Range<u64>>,
     seen: HashSet<(u64, Kind)>,

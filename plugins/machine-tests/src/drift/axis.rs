@@ -4,7 +4,7 @@ use runout_core::draws::Draw;
 
 use super::course::{OF_SECOND_DIFFERENCES, noise_of, range, smoothed, within_ends};
 
-/// Means on each side of one that stability is looked at over.
+/// Means on each side of one that stability is evaluated over.
 pub(super) const BESIDE: usize = 2;
 /// Windows so many standard deviations of a mean below the farthest one are not farther out: noise does that to one in 1e6 pairs.
 const REACH: f64 = 7.0;

@@ -9,9 +9,9 @@ use runout_core::Complex64;
 use super::passed;
 use crate::low_pass::significant;
 
-/// So many standard deviations of it in noise alone the variance of angles is believed from, also without the order that speaks most for it.
+/// The variance of angles is accepted from so many standard deviations of it in noise alone, also without the order that is the strongest evidence.
 const BELIEVED: f64 = 4.0;
-/// Orders from which angles are told: what moves an eccentricity has a direction too.
+/// Orders from which angles are known: what moves an eccentricity has a direction too.
 const FROM_ORDER: usize = 2;
 /// Errors of marks that are independent turn a turn by their mean over both ends; an angle within it lies on the line between them, with 4/3 of that
 /// variance on average. Errors that last for several turns have 1.
@@ -38,7 +38,7 @@ pub(super) struct Deviations<'a> {
     /// Mean of |d|², likewise.
     pub powers: &'a [f64],
     pub channels: usize,
-    /// Turns that were looked at, and all.
+    /// Turns that were evaluated, and all.
     pub turns: [usize; 2],
 }
 

@@ -12,19 +12,19 @@ use crate::low_pass::significant;
 /// A revolution in other units that angles come in.
 const RADIANS: f64 = TAU;
 const TURNS: f64 = 1.0;
-/// Orders of a revolution that are looked at: eccentricity and the form's lowest.
+/// Orders of a revolution that are evaluated: eccentricity and the form's lowest.
 const ORDERS: usize = 6;
 /// Share of a reading's variance that has to repeat with each revolution in another unit.
 const SHARE: f64 = 0.5;
 /// Turns in degrees from which on order 57.3 and its neighbours differ.
 const FEWEST_TURNS: f64 = 3.0;
-/// Samples of a long recording that are looked at, which takes some milliseconds.
+/// Samples of a long recording that are evaluated, which takes some milliseconds.
 const MOST_SAMPLES: u64 = 1 << 16;
 
 /// What of each reading repeats with each revolution, if the angle is in another unit.
 pub(super) struct AngleUnit {
     channels: usize,
-    /// Of so many samples, one is looked at.
+    /// Of so many samples, one is evaluated.
     step: usize,
     range_rev: [f64; 2],
     samples: f64,

@@ -28,7 +28,7 @@ pub(super) const PASS_BAND: f64 = 0.5;
 /// Largest error of a sine, as a share of its amplitude, below shares of the Nyquist frequency.
 #[cfg(test)]
 const ERRORS: [(f64, f64); 4] = [(0.02, 1e-8), (0.125, 1e-7), (0.25, 5e-7), (PASS_BAND, 3e-5)];
-/// The same of the orders that tests look at.
+/// Largest error of a sine, as a share of its amplitude, at the orders that tests evaluate.
 #[cfg(test)]
 pub(super) const ERROR: f64 = 1e-7;
 /// A frequency counts by (its share of Nyquist + `LEVEL`)^−`FALL`.
@@ -246,7 +246,7 @@ fn several<A: Arithmetic, const C: usize>(
     let fraction = |index: usize| positions[index] - below - index as f64;
     let place = kernel.place(fraction(TOGETHER / 2).clamp(0.0, 1.0));
     let across: [f64; TOGETHER] = std::array::from_fn(|index| place.across(fraction(index)));
-    // No `all`: it would look at one after the other.
+    // No `all`: it would examine one after the other.
     if !across.iter().fold(true, |near, across| near & (across.abs() <= SERVES)) {
         return None;
     }

@@ -125,7 +125,7 @@ impl Mean {
     }
 
     /// What the covariance of the mean would be with independent turns, `[order][channel][channel]`; `None` below two
-    /// turns looked at.
+    /// turns evaluated.
     pub(super) fn scatter(&self) -> Option<Vec<Complex64>> {
         let mut covariance = self.scatter.covariance()?;
         for entry in &mut covariance {
@@ -134,7 +134,7 @@ impl Mean {
         Some(covariance)
     }
 
-    /// By how much the turns looked at are turned against each other, about their [mean](Self::mean).
+    /// By how much the turns evaluated are turned against each other, about their [mean](Self::mean).
     pub(super) fn angle_scatter(&self, mean: &[Complex64], by_marks: bool) -> Option<AngleScatter> {
         let (squares, powers) = self.scatter.deviations()?;
         let turns = [self.scatter.turns(), self.turns];
@@ -143,7 +143,7 @@ impl Mean {
     }
 
     /// The [scatter](Self::scatter) without the neighbours that [`covariance`](Self::covariance) is taken from; `None` below
-    /// [`MANY_TURNS`], and where not all planned turns are there and looked at.
+    /// [`MANY_TURNS`], and where not all planned turns are there and evaluated.
     ///
     /// (T − 1) S = T Σ Cₖ Cₖᴴ over the T − 1 transforms Cₖ of the turns' harmonics, of which the neighbours are left out.
     pub(super) fn scatter_beside(&self) -> Option<Vec<Complex64>> {

@@ -4,7 +4,7 @@ use runout_core::{Complex64, numerics::statistics::upper_median, profile::Reject
 
 use super::{split::Means, turns::Turn};
 
-/// Turns that are looked at together, at least: enough for a median, few enough to drift little and to be kept.
+/// Turns that are evaluated together, at least: enough for a median, few enough to drift little and to be kept.
 const TOGETHER: usize = 16;
 
 /// Holds a few turns back until it can be said which of them are outliers.

@@ -48,7 +48,7 @@ pub(super) fn held(passed: &[Complex64]) -> usize {
     passed.iter().position(|passed| passed.norm() < LEAST_PASSED).unwrap_or(passed.len())
 }
 
-/// The same of the parts of a split.
+/// Divides the parts of a split by what passes of each order.
 pub(super) fn undo_split(split: &mut Split, passed: &[Complex64], channels: usize) {
     let parts = [&mut split.fit.neighbours, &mut split.held_out.neighbours, &mut split.neighbours];
     for coefficients in parts.into_iter().flatten().flat_map(|neighbours| &mut neighbours.coefficients) {

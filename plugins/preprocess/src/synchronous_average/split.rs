@@ -14,7 +14,7 @@ use super::{low_orders::LowOrders, mean::Mean, size::Size, spread::Extremes, tur
 const TOGETHER: usize = 4;
 /// Memory that turns may take up which wait for others, in numbers.
 const WAITING: usize = 1 << 17;
-/// Turns a channel whose harmonics are looked at, at least, where there are as many: what weights ask for.
+/// Turns a channel whose harmonics are evaluated, at least, where there are as many: what weights ask for.
 const LOOKED_AT_A_CHANNEL: usize = 10;
 
 /// The mean of all turns, and of parts of them; how far turns lie apart.
@@ -28,7 +28,7 @@ pub(super) struct Means {
     readings: usize,
     /// Turns that are in no sum yet.
     pending: usize,
-    /// Of so many turns, one is looked at.
+    /// Of so many turns, one is evaluated.
     stride: usize,
     levels: TurnLevels,
     low_orders: LowOrders,
@@ -88,7 +88,7 @@ impl Means {
         &mut self.waiting[self.pending * self.readings..][..self.readings]
     }
 
-    /// Whether the harmonics of the next turn are looked at: parts look at each turn, the whole at as many of them as without parts,
+    /// Whether the harmonics of the next turn are evaluated: parts take each turn, the whole at as many of them as without parts,
     /// so that it is the same.
     pub(crate) fn looks_at_next(&self) -> bool {
         self.parts.is_some() || self.whole_looks_at_next()

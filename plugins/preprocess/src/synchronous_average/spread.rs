@@ -78,7 +78,7 @@ impl Motion {
     }
 }
 
-/// Points that are looked at together.
+/// Points that are evaluated together.
 const LANES: usize = 8;
 
 /// Takes a turn in one direction into the lowest and the highest at each angle, and gives the sum of its squares.

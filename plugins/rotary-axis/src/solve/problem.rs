@@ -37,7 +37,7 @@ impl<'a> Problem<'a> {
         4 + 3 * self.layout.balls.len() + self.effects.len()
     }
 
-    /// Rows of a command's readings: what is left of them, and their derivatives by common unknowns and component errors.
+    /// Rows of a command's readings: their residual, and their derivatives by common unknowns and component errors.
     fn rows(&self, command: usize, state: &State, weighted: bool) -> (DVector<f64>, DMatrix<f64>, DMatrix<f64>) {
         let members = &self.members[command];
         let mut left = DVector::zeros(3 * members.len());

@@ -1,7 +1,7 @@
 //! Changes within a setup: a probe that slips shows in the turns, from one of them on, and in no other sensor.
 //!
 //! The average of such a reading is that of no one state. Its change, as large as it is, goes into its uncertainty, so that
-//! no effect has to take the blame.
+//! it is attributed to no effect.
 
 use runout_core::{
     Complex64,
@@ -192,7 +192,7 @@ impl Series {
         before.norm_sqr() * (1.0 / turn as f64 + 1.0 / (self.turns - turn) as f64)
     }
 
-    /// The same with the step between the blocks next to the turn for one of its factors.
+    /// Sum of squares between the turns before and after one, with the step between the blocks next to the turn for one of its factors.
     fn sudden(&self, order: usize, turn: usize, row: &[Complex64]) -> f64 {
         let values: Vec<Complex64> = self.combined(order, row).collect();
         let length = BLOCK.min(turn).min(self.turns - turn);

@@ -20,7 +20,7 @@ use crate::{
 
 /// What moves form and motion by less is another way to say the same, in µm.
 const SAME_UM: f64 = 1e-6;
-/// A mistake that changes χ² by less than the square of this, in units of what is left, is not observable.
+/// A mistake that changes χ² by less than the square of this, in units of the residual, is not observable.
 const VISIBLE: f64 = 3.0;
 
 impl SpindleModel {

@@ -289,7 +289,7 @@ pub fn diagnose(
     run(&SpindleModel::new(selection, layout, second_order, effects, stations)?, stations, settings)
 }
 
-/// The same on a model; of the stations, their splits are not needed any more.
+/// Runs the loop on a model; of the stations, their splits are not needed any more.
 fn run(model: &SpindleModel, stations: &[Station], settings: &Settings) -> Result<StationDiagnosis> {
     let changes: Vec<&Change> = model.traced.data.iter().flat_map(|station| &station.seen.changes).collect();
     // What a sensor or its neighbour lacks in all setups cannot be distinguished from what happened to it in one.

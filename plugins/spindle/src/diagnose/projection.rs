@@ -17,7 +17,7 @@ pub(crate) fn project(
     }
 }
 
-/// The same where some readings are 0 at all orders: those that an effect leaves alone.
+/// Matrix (`[row][column]`) times each order's readings, where some readings are 0 at all orders: an effect does not change them.
 pub(crate) fn project_some(
     matrices: &[Vec<Complex64>],
     harmonics: &[Complex64],

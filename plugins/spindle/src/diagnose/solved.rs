@@ -23,13 +23,13 @@ pub(super) struct Solved {
     pub alterations: Alterations,
     /// Nothing of a part of the turns, once what is held out has been predicted.
     pub propagation: Option<Propagation>,
-    /// The same with what results are uncertain by beyond noise: angles, turns that change, and what the residual refutes. Nothing where
-    /// that is nothing, and of a part of the turns.
+    /// The propagation with the uncertainty beyond noise: of angles, of turns that change, and of what the residual refutes.
+    /// Nothing where there is none, and of a part of the turns.
     pub stated: Option<Propagation>,
     pub estimate: Estimate,
-    /// Readings taken back to displacements, without their covariance.
+    /// Readings converted to displacements, without their covariance.
     pub corrected: Readings,
-    /// The same without what exact geometry adds.
+    /// The corrected readings without what exact geometry adds.
     pub linear: Vec<Complex64>,
     /// W (I − A P) of each order from 1, over the noise of a real degree of freedom.
     pub whitened: Vec<Vec<Complex64>>,
@@ -39,7 +39,7 @@ pub(super) struct Solved {
     pub floor_std: Vec<f64>,
     /// Mean slope of the characteristics, `[reading]`.
     pub slopes: Vec<f64>,
-    /// What is left of the readings, as a run states it.
+    /// The residual of the readings, as a run states it.
     pub residual: Residual,
 }
 

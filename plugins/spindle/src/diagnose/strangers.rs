@@ -21,8 +21,8 @@ const ALIKE: f64 = 0.98;
 /// It has a place within the turn where half of its square lies within this share of the turn.
 const NARROW: f64 = 0.2;
 
-/// What a station's residual says of a stranger: only orders at which a reading is redundant show one, and only a reading that explains
-/// it better than the others is named.
+/// What a station's residual shows of an unmodelled disturbance: only orders at which a reading is redundant show one, and only a reading that
+/// explains it better than the others is named.
 pub(crate) fn where_from(solved: &Solved, layout: &Layout, rig: &Rig) -> Option<Unexplained> {
     let count = solved.corrected.count;
     let mut total = 0.0;

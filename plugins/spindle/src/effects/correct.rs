@@ -1,4 +1,4 @@
-//! Readings taken back to displacements, with the effects that are applied.
+//! Readings converted to displacements, with the effects that are applied.
 
 use runout_core::{Complex64, numerics::fourier::Fourier};
 

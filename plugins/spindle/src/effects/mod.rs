@@ -181,7 +181,7 @@ pub enum ActsOn {
     Sensor,
     /// Any two sensors: the target is first · (number of sensors) + second.
     SensorPair,
-    /// The same in either order: the second instead of the first is another target.
+    /// Any two sensors, in either order: the second instead of the first is another target.
     SensorCopy,
     /// Any sensor in any one setup: the target is sensor · (number of setups) + setup.
     SensorInSetup,
@@ -193,7 +193,7 @@ pub enum ActsOn {
     LaterSetup,
     /// Any two setups: the target is first · (number of setups) + second.
     SetupPair,
-    /// The same in either order.
+    /// Any two setups, in either order.
     SetupCopy,
     /// The rig as a whole.
     Rig,

@@ -35,7 +35,7 @@ pub struct Predicted<'a> {
 }
 
 impl<'a> Predicted<'a> {
-    /// From a solution; `displacements` are the readings taken back to them.
+    /// From a solution; `displacements` are the readings converted to them.
     #[must_use]
     pub(crate) fn new(
         layout: &'a Layout,

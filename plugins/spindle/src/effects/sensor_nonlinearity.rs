@@ -30,7 +30,7 @@ impl SpindleEffect for SensorNonlinearity {
     fn partials(&self, target: usize, predicted: &Predicted) -> Vec<Vec<Complex64>> {
         let sensor = &predicted.alterations.sensors[target];
         let (a, b) = (sensor.quadratic_per_um, sensor.cubic_per_um2);
-        // Seen on the displacements, to which readings are taken back.
+        // Seen on the displacements, to which readings are converted.
         let slope = |u: f64| 1.0 + u * (2.0 * a + 3.0 * b * u);
         let on = |reading: &crate::layout::Reading| reading.sensor == target;
         vec![

@@ -1,4 +1,4 @@
-//! `speed-ripple`: between two index pulses the spindle runs unevenly; a recording in time believes to be at φ when the spindle
+//! `speed-ripple`: between two index pulses the spindle runs unevenly; a recording in time assumes φ when the spindle
 //! is at φ + ε(φ), ε = a (cos nφ − 1) + b sin nφ, 0 at the pulses. ∂/∂a = u'(Φ) (cos nΦ − 1), ∂/∂b = u'(Φ) sin nΦ.
 //! a and b are in degrees, as in a scenario.
 

@@ -81,7 +81,7 @@ pub fn foresee(
     Ok(foresight)
 }
 
-/// The same with all of a rig, the general separator and every effect of this crate.
+/// What the closed loop could find of every effect of this crate with all of a rig and the general separator.
 ///
 /// # Errors
 /// When the model cannot be fitted.
@@ -94,7 +94,7 @@ pub fn foresee_rig(rig: &Rig) -> Result<Foresight> {
 /// # Errors
 /// When a model cannot be fitted.
 pub fn changes(rig: &Rig, foresight: &Foresight, known: &[Suggestion], clearance_deg: f64) -> Result<Changes> {
-    // What has no parameter is a mistake in the rig file, which a closer look at the rig prevents: no addition is needed for it.
+    // What has no parameter is a mistake in the rig file, which a closer check of the rig prevents: no addition is needed for it.
     let mistakes: Vec<&str> =
         effects::all().iter().filter_map(|kind| kind.mistake().map(|_| kind.about().id)).collect();
     let is_mistake = |name: &String| name.split(' ').next().is_some_and(|id| mistakes.contains(&id));

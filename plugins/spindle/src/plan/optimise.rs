@@ -16,13 +16,13 @@ const DRAWS: usize = 60_000;
 const REFINED: usize = 60;
 /// Arrangements near one that are tried before the search for a better one ends.
 const NEIGHBOURS: usize = 2000;
-/// The same where each is tried at many placements within the tolerance.
+/// Arrangements near one that are tried, where each is tried at many placements within the tolerance.
 const NEIGHBOURS_WITHIN_TOLERANCE: usize = 300;
 /// Longest step of the refinement: 5°.
 const LONGEST_STEP: f64 = 500.0;
 /// With more sensors than this, corners of the tolerance are drawn instead of all being tried.
 const ALL_CORNERS: usize = 6;
-/// Placements inside the tolerance that a result is looked at besides.
+/// Placements inside the tolerance at which a result is evaluated besides.
 const INSIDE: usize = 500;
 /// Two arrangements are different when some distance between two sensors differs by this much, in degrees.
 const DIFFERENT_DEG: f64 = 2.0;
@@ -135,7 +135,7 @@ pub fn optimise(rig: &Rig, search: &Search, progress: &mut dyn FnMut(&str)) -> R
 }
 
 /// What arrangements are tried on. An arrangement is the sensors' angles in hundredths of a degree; the first's is not
-/// looked at.
+/// used.
 struct Bench<'a> {
     rig: &'a Rig,
     search: &'a Search,
@@ -143,7 +143,7 @@ struct Bench<'a> {
     gain: FormGain,
     /// What is added to the sensors' angles, in rad, the nominal placement (nothing) among them.
     corners: Vec<Vec<f64>>,
-    /// The same inside the tolerance, where a high order may be worse than at any corner.
+    /// Angles inside the tolerance that are added to the sensors' angles, in rad: a high order may be worse there than at any corner.
     inside: Vec<Vec<f64>>,
 }
 

@@ -170,7 +170,7 @@ impl ClosedFormSeparator {
         let mut orders = general.orders;
         for order in 2..=readings.max_order {
             let qr = self.layout.factor(order);
-            // What is left of a lost order is still a residual: any least-squares solution shows it.
+            // A lost order still has a residual: any least-squares solution shows it.
             let operator = self.method.operator(&self.layout, order).unwrap_or_else(|| qr.operator());
             orders.push(OrderOperator { operator, rank: qr.rank() });
         }

@@ -1,4 +1,4 @@
-//! The part: one function h(α, z), so that whatever looks at the same z sees the same circle.
+//! The part: one function h(α, z), so that all sensors at the same z see the same circle.
 
 use std::f64::consts::TAU;
 
@@ -120,7 +120,7 @@ impl Form {
         harmonics
     }
 
-    /// The same at a z for each lane, into memory that is kept.
+    /// Writes the harmonics of the circle at a z for each lane, in µm, from order 0, into memory that is kept.
     pub(crate) fn fill<const L: usize>(&self, z_mm: &[f64; L], harmonics: &mut Vec<Phasor<L>>) {
         harmonics.clear();
         harmonics.resize(self.orders(), Phasor::ZERO);

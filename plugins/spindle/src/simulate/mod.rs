@@ -97,7 +97,7 @@ impl SpindleSimulator {
         self.recording_in_blocks(recording::BLOCK_SAMPLES)
     }
 
-    /// The same with another number of samples in each block: the samples are the same.
+    /// The recording with another number of samples in each block: the samples are the same.
     #[must_use]
     pub fn recording_in_blocks(&self, block_samples: usize) -> SpindleRecording<'_> {
         SpindleRecording { world: &self.world, block_samples }

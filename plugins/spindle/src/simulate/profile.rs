@@ -53,7 +53,7 @@ impl Profile {
         &self.harmonics
     }
 
-    /// The same of another circle: of the form there.
+    /// Changes the form of another circle into what the sensor sees there, in µm.
     pub(crate) fn see(&self, form: &mut Vec<Phasor<LANES>>) {
         form.resize(self.harmonics.len(), Phasor::ZERO);
         for (value, besides) in form.iter_mut().zip(&self.besides) {

@@ -107,7 +107,7 @@ struct Looking<'a> {
     motion_share: f64,
     /// What it sees of the part at its z.
     profile: Profile,
-    /// The same where axial motion has moved the part, instant by instant.
+    /// What it sees where axial motion has moved the part, instant by instant.
     moved: Vec<Phasor<LANES>>,
     strangers: Vec<Acting>,
     channel: Channel<'a>,

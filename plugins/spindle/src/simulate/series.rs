@@ -47,7 +47,7 @@ pub(super) trait Series<const L: usize> {
     fn sum(&self, z: &Phasor<L>) -> [f64; L];
 }
 
-/// The same harmonics in all lanes.
+/// Harmonics that all lanes have in common.
 impl<const L: usize> Series<L> for [Complex64] {
     fn sum(&self, z: &Phasor<L>) -> [f64; L] {
         let (mut re, mut im) = ([0.0; L], [0.0; L]);

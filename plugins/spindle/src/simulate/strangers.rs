@@ -41,7 +41,7 @@ impl Slip {
     }
 }
 
-/// A stranger in one capture: samples must come in their order.
+/// An unmodelled disturbance in one capture: samples must come in their order.
 #[derive(Debug)]
 pub(super) struct Acting {
     kind: Kind,

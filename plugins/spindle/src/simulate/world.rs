@@ -25,7 +25,7 @@ use super::{
 /// Everything that a capture is computed from.
 #[derive(Debug)]
 pub(super) struct World {
-    /// As it is believed to be.
+    /// As it is declared.
     pub rig: Rig,
     pub seed: u64,
     pub geometry: Geometry,

@@ -1,6 +1,6 @@
 //! The solution of all orders together, where a large eccentricity couples them.
 //!
-//! A surface that goes sideways by t is seen turned by t/R. Form of order n thereby goes to the orders around it by the
+//! A surface that moves laterally by t is seen turned by t/R. Form of order n thereby goes to the orders around it by the
 //! share n·e/(2R) of an eccentricity e and, where n·e/R is near to 1 or above it, to many of them. Orders solved one by one,
 //! with what exact geometry adds taken from the last solution, then do not settle. Here the angles at which each line meets
 //! the profile are kept (they follow from eccentricity and motion, which are known far better than a wave's length), which

@@ -1,12 +1,12 @@
 //! What exact geometry carries out of orders that are lost, and out of the form of a face.
 //!
-//! A surface that goes sideways by t is seen turned by t/R: the reading gains −(t/R)·h'(α) (`docs/appendix/physics.md` section 1).
+//! A surface that moves laterally by t is seen turned by t/R: the reading gains −(t/R)·h'(α) (`docs/appendix/physics.md` section 1).
 //! With an eccentricity C in part coordinates, t = −Im C e^{iα}, form H of order n appears at order n + 1 as n·C·H/(2R) and
 //! at order n − 1 as −n·C*·H/(2R); motion of order n across the sensor carries form of order p to n + p and |n − p| in the same way. Form and
 //! motion of a lost order are not known, so that this is not known either: it is part of the readings' uncertainty. The
 //! readings themselves say how large they may be, since each reading is the sum of both.
 //!
-//! A face that goes sideways by t under an axial sensor at the radius ρ is seen turned by t/ρ in the same way. The separators solve
+//! A face that moves laterally by t under an axial sensor at the radius ρ is seen turned by t/ρ in the same way. The separators solve
 //! axial readings to first order, so that what the eccentricity carries between orders of a face is part of the readings'
 //! uncertainty too, whether orders are lost or not.
 
@@ -55,7 +55,7 @@ struct Carried<'a> {
     lost: Vec<bool>,
     /// Mean square of the readings, `[order][section]`: of form and motion together.
     squares: Vec<Vec<f64>>,
-    /// The same of axial readings: of a face's form and motion along the axis together.
+    /// Mean square of the axial readings, `[order][section]`: of a face's form and motion along the axis together.
     face_squares: Vec<Vec<f64>>,
     /// Mean square over all sections.
     mean: Vec<f64>,

@@ -19,7 +19,7 @@ use super::{
 use crate::{layout::Layout, layout::System};
 
 /// Columns of norm 1 are sure to be independent where the inverse of their triangle is below this. What is nearer to
-/// dependent is looked at by pivoting; the limit is far from both its tolerance and where digits would be missed.
+/// dependent is examined by pivoting; the limit is far from both its tolerance and where digits would be missed.
 const SURELY_INDEPENDENT: f64 = 1e5;
 
 /// The linear solution of one order: unknowns = operator · readings.

@@ -23,7 +23,7 @@ pub(crate) struct Propagation {
     pub covariance: Vec<Vec<Complex64>>,
     /// Mean of |residual|² of each order: the trace of (I − A·P)·Σ·(I − A·P)ᴴ.
     pub squares: Vec<f64>,
-    /// The same of the residual weighted by W, P being the least-squares operator of W·A: the trace of
+    /// Mean of |residual|² of each order, weighted by W, P being the least-squares operator of W·A: the trace of
     /// W·(I − A·P)·Σ·(I − A·P)ᴴ·Wᴴ. Empty without weights.
     pub weighted_squares: Vec<f64>,
 }

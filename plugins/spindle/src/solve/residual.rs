@@ -70,7 +70,7 @@ fn residual(
     }
 }
 
-/// The same without what uncertain angles of the setups explain: what is left is held against noise and angles.
+/// The residual without what uncertain angles of the setups explain, compared with noise and angles; and the factor for the covariance of each order.
 pub(crate) fn judged_residual(
     operators: &Operators,
     readings: &Readings,

@@ -55,7 +55,7 @@ pub(crate) struct SecondOrder<'a> {
     turned: Vec<Complex64>,
     /// Part angles where lines meet the profile, rad, `[reading][angle]`.
     met_rad: Vec<f64>,
-    /// The same of one reading at all samples.
+    /// Part angles where the line of one reading meets the profile, rad, at all samples.
     met_at: Vec<f64>,
 }
 
@@ -102,7 +102,7 @@ impl<'a> SecondOrder<'a> {
         let mut curve = Vec::with_capacity(samples);
         self.met_rad.clear();
         for (index, reading) in layout.readings.iter().enumerate() {
-            // What the face does where it moves sideways is left linear: its slope across the axis is not known.
+            // Lateral motion of the face is left linear: its slope across the axis is not known.
             if reading.view.is_axial() {
                 let steps = (0..samples).step_by(self.finer);
                 self.met_rad.extend(steps.map(|step| layout.part_angle_rad(reading, step, samples)));

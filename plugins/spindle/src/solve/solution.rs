@@ -88,7 +88,7 @@ impl Solver<'_> {
         Ok((separation, readings))
     }
 
-    /// What a large eccentricity carries into orders that are observable, of what is not: a surface that goes sideways by e turns
+    /// What a large eccentricity carries into orders that are observable, of what is not: a surface that moves laterally by e turns
     /// under the sensor by e/R, and order n is then seen by n·e/R of its amplitude one order lower and higher.
     fn carried(&self, readings: &Readings, separation: &Separation) -> Option<String> {
         let width = separation.unknowns.len();
@@ -176,7 +176,7 @@ impl Solver<'_> {
         self.second_order && share * readings.max_order as f64 > COUPLED
     }
 
-    /// The same, of all orders together.
+    /// Solves all orders together, pass by pass, until the solution settles. Gives the solution and the linear readings, `[order][reading]`.
     fn together(
         &self,
         readings: &Readings,

@@ -73,7 +73,7 @@ pub(crate) fn averaged(config: &SpindleConfig, rig: &Rig) -> (Station, StationTr
     averaged_behind(None, config, rig)
 }
 
-/// The same of recordings that are changed on their way.
+/// The station of recordings that are changed on their way, a fifth of its turns held out, and its truth.
 pub(crate) fn averaged_from(
     config: &SpindleConfig,
     rig: &Rig,
@@ -82,7 +82,7 @@ pub(crate) fn averaged_from(
     averaged_through(None, config, rig, change)
 }
 
-/// The same behind a low-pass.
+/// The station of recordings behind a low-pass, a fifth of its turns held out, and its truth.
 pub(crate) fn averaged_behind(cutoff_hz: Option<f64>, config: &SpindleConfig, rig: &Rig) -> (Station, StationTruth) {
     averaged_through(cutoff_hz, config, rig, |input| input)
 }

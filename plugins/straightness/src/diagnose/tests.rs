@@ -45,7 +45,7 @@ fn zero(kind: Kind) -> Vec<f64> {
     kind.parameters().iter().map(|parameter| if parameter.name == "time_constant" { 0.3 } else { 0.0 }).collect()
 }
 
-/// Signatures beside differences of what is left, outside the span of everything that is fitted, and moves beside
+/// Signatures beside differences of the residual, outside the span of everything that is fitted, and moves beside
 /// differences of part and slide: of each effect alone, at nothing and at much, beside another effect.
 #[test]
 fn signatures_and_moves_are_those_of_refits() {

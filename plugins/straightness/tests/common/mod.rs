@@ -34,7 +34,7 @@ pub(crate) struct Shot {
     /// The probe is at z + shift where the file says z.
     pub shift_mm: f64,
     pub gain: f64,
-    /// Sideways tilt of the part under the probe: the sagitta at the ends, in µm.
+    /// Tilt of the part across the trace: the sagitta at the ends, in µm.
     pub bow_um: f64,
     /// Settling: amplitude in µm, time constant in lengths of a trace.
     pub drift: [f64; 2],

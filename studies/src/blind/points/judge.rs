@@ -56,7 +56,7 @@ pub struct Valued {
     pub symbol: String,
     /// Error over standard uncertainty with the declared model; NaN where it is lost.
     pub declared: f64,
-    /// The same with the final model.
+    /// Error over standard uncertainty with the final model; NaN where it is lost.
     pub last: f64,
     /// How much farther from the truth the final model has it, in standard uncertainties of the final model.
     pub farther: f64,

@@ -14,7 +14,7 @@ use judge::Judged;
 pub struct Domain {
     /// Its separator's name, as `--domain` takes it.
     pub name: &'static str,
-    /// Draws a campaign of a kind; `turn` counts those of its kind, so that each effect and stranger has its turn.
+    /// Draws a campaign of a kind; `turn` counts those of its kind, so that each effect and unmodelled disturbance is drawn in turn.
     pub draw: fn(kind: Kind, turn: usize, chance: &mut Chance) -> Result<Campaign>,
 }
 
@@ -26,7 +26,7 @@ pub struct Campaign {
     pub points: Points,
     /// What is declared.
     pub separator: Box<dyn PointSeparator>,
-    /// What is wrong; of a stranger only its id counts.
+    /// What is wrong; of an unmodelled disturbance only its id counts.
     pub planted: Vec<Planted>,
     /// Ids of effects that the simulated world has by itself, so that naming them is right.
     pub natural: Vec<String>,

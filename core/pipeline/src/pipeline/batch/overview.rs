@@ -1,4 +1,4 @@
-//! What a batch found, as a page to look at shows it beside the control charts.
+//! What a batch found, as the report shows it beside the control charts.
 
 use super::{BatchReport, Series, SpeedSeries};
 use crate::stage::{Overview, Part, Section};

@@ -285,8 +285,8 @@ fn shifts_of(one: &AtSpeed, slowest: &AtSpeed, rig: &Rig) -> Vec<Row> {
 /// x and y by least squares, each with its standard uncertainty and the degrees of freedom that it is known from (Welch, Satterthwaite); nothing of
 /// sensors along one line.
 ///
-/// What a sensor's level is uncertain by is its own noise, or motion of the axis that all sensors see, each its component. Levels do not tell which:
-/// the larger of both counts.
+/// What a sensor's level is uncertain by is its own noise, or motion of the axis that all sensors see, each its component. Levels do not distinguish
+/// them: the larger of both counts.
 fn shift(changes: &[Change]) -> Option<[(f64, Option<Known>); 2]> {
     let sum = |of: &dyn Fn(&Change) -> f64| changes.iter().map(of).sum::<f64>();
     let [xx, xy, yy] = [

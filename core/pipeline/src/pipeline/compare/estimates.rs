@@ -110,8 +110,7 @@ impl Estimates {
         (self.motion_z_mm - z_mm).abs() <= SAME_PLANE_MM
     }
 
-    /// The same with x and y at another z: x(z) = X + z·E_y, y(z) = Y − z·E_x; lost where the tilt is. `None` where
-    /// no tilt is observable.
+    /// The estimates with x and y at another z: x(z) = X + z·E_y, y(z) = Y − z·E_x; lost where the tilt is. `None` where no tilt is observable.
     pub(crate) fn moved_to(&self, z_mm: f64, scatter: &Scatter) -> Option<Self> {
         if self.in_plane(z_mm) {
             return Some(self.clone());

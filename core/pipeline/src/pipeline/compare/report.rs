@@ -67,7 +67,7 @@ pub struct StationComparison {
 }
 
 impl StationComparison {
-    /// The same without what is given order by order.
+    /// The comparison without what is given order by order.
     #[must_use]
     pub fn without_orders(mut self) -> Self {
         for quantity in &mut self.quantities {

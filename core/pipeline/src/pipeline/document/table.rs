@@ -24,7 +24,7 @@ pub fn read<T: DeserializeOwned + JsonSchema>(table: &Table) -> Result<T, Fault>
     read_besides(table, &[])
 }
 
-/// The same, of a table in which these keys stood besides: what is misspelt may have been meant for one of them.
+/// Reads a table into a type. The keys `besides` were in the table too: a misspelt key may have been meant for one of them.
 ///
 /// # Errors
 /// When the table does not fit the type.

@@ -113,7 +113,7 @@ impl PutRight {
     }
 }
 
-/// An addition without parameters, by what is left before and after it.
+/// An addition without parameters, by the residual before and after it.
 fn addition(effect: &str, targets: Vec<String>, [before, after]: [Left; 2], p_value: f64) -> Added {
     Added {
         effect: effect.into(),

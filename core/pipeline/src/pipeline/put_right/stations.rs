@@ -68,7 +68,7 @@ fn note(found: &mut PutRight, rig: &Rig, (setup, tried): (usize, usize), [one, o
     ));
 }
 
-/// Two stations whose profiles of one setup are exchanged, and what is left of them then.
+/// Two stations whose profiles of one setup are exchanged, and their residual then.
 struct Exchange {
     profile: usize,
     pair: [usize; 2],

@@ -13,7 +13,7 @@ use crate::{
     unit::{self, Known},
 };
 
-/// Lines that are looked at for the beginning of the table.
+/// Lines that are examined for the beginning of the table.
 const HEAD: usize = 400;
 /// Rows in which the table shows what its columns hold.
 const SHOWN: usize = 30;
@@ -193,7 +193,8 @@ impl Run {
     }
 }
 
-/// How the table is written, its first line and that behind those that were looked at, and how many cells a row has: of all dialects that which gives most cells.
+/// How the table is written, its first line and that behind those that were examined, and how many cells a row has: of all dialects that
+/// which gives most cells.
 fn beginning(lines: &[Line]) -> Option<(Dialect, usize, usize, usize)> {
     let stated = lines.first().and_then(|line| {
         let line = line.text.strip_prefix(&[0xEF, 0xBB, 0xBF]).unwrap_or(&line.text);

@@ -11,7 +11,8 @@ fn diagnosed(more: impl Fn(usize, f64, f64) -> f64) -> Diagnosis {
     placed([0.0; 2], more)
 }
 
-/// The same with the axis further off, in µm: distances of points from where the axis should be, without any approximation.
+/// Eight circles with noise as in [`diagnosed`], and the axis further off, in µm: distances of points from where the axis should
+/// be, without any approximation.
 fn placed(further: [f64; 2], more: impl Fn(usize, f64, f64) -> f64) -> Diagnosis {
     let mut seed = 11_u64;
     let mut normal = || {

@@ -49,7 +49,7 @@ fn the_scatter_is_that_of_the_turns() {
 /// The scatter without the neighbours, from the turns' harmonics freed of e^{±2πikm/T}, k = 1, 2, by least squares.
 #[test]
 fn the_scatter_beside_the_neighbours_is_what_they_leave() {
-    // Of fewer channels, the weights look at a part of so many turns only.
+    // Of fewer channels, the weights use a part of so many turns only.
     let (length, turns) = (32, 40);
     let mut random = scatter(6);
     let data: Vec<Vec<f64>> = (0..3).map(|_| (0..turns * length).map(|_| 5.0 + random()).collect()).collect();

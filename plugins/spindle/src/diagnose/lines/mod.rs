@@ -3,7 +3,7 @@
 //! A harmonic of one turn sees a line at order ν as a phasor that turns by ν from turn to turn: its spectrum over the turns
 //! has a peak there. A line is one that stands far out of all others, since asynchronous motion may be many tones. Its
 //! amplitude in each channel is then fitted to all low harmonics of the turns to be fitted (`search.rs`), and it is taken out of the
-//! turns, their averages and the noise of these: what is left of the turns is searched for further lines. It is a motion where all
+//! turns, their averages and the noise of these: the residual of the turns is searched for further lines. It is a motion where all
 //! channels fit one displacement and tilt (`source.rs`), and else electrical pick-up. A line of the machine keeps its order; one of the
 //! mains keeps its frequency, also where captures differ in speed.
 

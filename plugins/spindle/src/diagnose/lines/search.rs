@@ -62,7 +62,7 @@ struct Searched<'a> {
 }
 
 impl Searched<'_> {
-    /// What stands out of the turns, then out of what is left of them, until nothing does.
+    /// What stands out of the turns, then out of their residual, until nothing does.
     fn lines(mut self) -> Lines {
         let mut lines: Vec<Line> = Vec::new();
         while lines.len() < MOST_LINES {

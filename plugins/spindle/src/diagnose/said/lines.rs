@@ -145,7 +145,7 @@ fn rate_of(stations: &[Station]) -> Option<f64> {
     stations.first()?.profiles.first()?.sample_rate_hz
 }
 
-/// What is left at an order that is the mains at the spindle's speed, within a part of a period over the record.
+/// The residual at an order that is the mains at the spindle's speed, within a part of a period over the record.
 fn whole_order(diagnosis: &Diagnosis, stations: &[Station]) -> Option<String> {
     let profile = stations.first()?.profiles.first()?;
     let turns_hz = profile.speed_rpm? / 60.0;

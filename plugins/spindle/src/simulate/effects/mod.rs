@@ -1,6 +1,6 @@
 //! What happens besides: each effect changes the simulated world where it would change the real one.
 //!
-//! Strangers are effects that no model knows.
+//! Unmodelled disturbances are effects that no model knows.
 
 mod channels;
 mod mistakes;

@@ -1,4 +1,4 @@
-//! What the closed loop does not know: it must say that something is left, and not blame another effect.
+//! Unmodelled disturbances: the closed loop must report an unexplained residual and must not attribute it to a known effect.
 
 use runout_core::{Complex64, fault::Fault};
 use schemars::JsonSchema;
@@ -167,7 +167,7 @@ impl Acts for SlippedProbe {
     }
 }
 
-/// Adds a stranger to sensors, in the setups named or, where none is, in all.
+/// Adds an unmodelled disturbance to sensors, in the setups named or, where none is, in all.
 fn add(world: &mut World, targets: &[String], setups: &[String], kind: Kind) -> Result<(), Fault> {
     let mut there = vec![setups.is_empty(); world.setups.len()];
     if !setups.is_empty() {

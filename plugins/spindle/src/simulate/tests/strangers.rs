@@ -1,4 +1,4 @@
-//! Each stranger changes what it should, by what it should, and nothing else.
+//! Each unmodelled disturbance changes what it should, by what it should, and nothing else.
 
 use super::{
     effects::{INITIAL, PART, TURNED, check, form, ids, motion, place, reading, scene},

@@ -65,7 +65,7 @@ fn simulated_axial_motion_comes_back_within_its_uncertainty() {
                 let width = found.unknowns.len();
                 for (order, truth) in harmonics(&truth.form_um[3]).iter().enumerate().skip(2) {
                     let place = order * width + face;
-                    // Six standard uncertainties of a complex number, and what a face that goes sideways adds.
+                    // Six standard uncertainties of a complex number, and what a face that moves laterally adds.
                     let allowed = 6.0 * found.variance[place].sqrt() + 2e-3;
                     let error = (found.estimate[place] - truth).norm();
                     assert!(error < allowed, "{rotation:?} order {order}: {error} > {allowed}");

@@ -11,7 +11,8 @@ fn finds(effect: &str, named: &str, parameter: Option<(&str, f64)>) {
     finds_in(&|config| config, effect, named, parameter);
 }
 
-/// The same in a campaign that differs.
+/// One effect in a campaign that differs: it is named by itself or in its set, with its size where it is alone, and form is no
+/// farther off than before.
 fn finds_in(
     changed: &dyn Fn(SpindleConfig) -> SpindleConfig,
     effect: &str,

@@ -3,7 +3,7 @@
 use super::*;
 
 #[test]
-fn a_stranger_stays_unexplained() {
+fn an_unmodelled_disturbance_stays_unexplained() {
     // A step over part of the turn in one sensor and one setup: no effect of the library.
     let effect = r#"[{"plugin":"step","targets":["S3"],"setups":["b"],"step_um":1.0,"from_deg":100.0,"to_deg":160.0}]"#;
     let (found, [before, after]) = diagnosed(&campaign(5, effect));
@@ -19,7 +19,7 @@ fn a_stranger_stays_unexplained() {
     assert!(after <= 1.001 * before);
 }
 
-/// Three sensors in one setup are redundant at order 1 only: what is left there is said, and no sensor is named.
+/// Three sensors in one setup are redundant at order 1 only: the residual there is reported, and no sensor is named.
 #[test]
 fn a_residual_that_every_sensor_explains_names_none() {
     let mut config = campaign(9, r#"[{"plugin":"sensor-gain","targets":["S2"],"relative_gain":0.05}]"#);
@@ -73,10 +73,10 @@ fn a_step_of_a_level_is_said_and_is_no_drift() {
     assert!(diagnosis.added.is_empty(), "{:?}", diagnosis.added);
 }
 
-/// A stranger many times larger than form and motion can be fitted in part by an absurd value of an effect: motion 700 times as
-/// large in one setup, a sensor 300 mm off, 3 mm of axial motion. None of them is blamed.
+/// An unmodelled disturbance many times larger than form and motion can be fitted in part by an absurd value of an effect: motion 700
+/// times as large in one setup, a sensor 300 mm off, 3 mm of axial motion. It is attributed to none of them.
 #[test]
-fn a_large_stranger_is_blamed_on_nothing() {
+fn a_large_unmodelled_disturbance_is_attributed_to_no_effect() {
     for (seed, effect) in [
         (41, r#"{"plugin":"step","targets":["S3"],"setups":["b"],"step_um":-126.0,"from_deg":56.0,"to_deg":187.0}"#),
         (43, r#"{"plugin":"dent","setups":["c"],"depth_um":-92.0,"width_deg":3.2,"part_angle_deg":221.0}"#),
@@ -128,7 +128,7 @@ fn held_out_turns_are_as_far_off_as_is_expected() {
 
 /// Play in one channel, large enough to see and small enough for an effect to take half of it.
 #[test]
-fn a_small_stranger_is_blamed_on_nothing() {
+fn a_small_unmodelled_disturbance_is_attributed_to_no_effect() {
     for (seed, play_um) in [(31, 0.02), (32, 0.03), (33, 0.04), (34, 0.05)] {
         let effect = format!(r#"[{{"plugin":"backlash","targets":["S2"],"play_um":{play_um}}}]"#);
         let (found, [before, after]) = diagnosed(&campaign(seed, &effect));
@@ -142,7 +142,7 @@ fn a_small_stranger_is_blamed_on_nothing() {
     }
 }
 
-/// A probe that slips in the middle of a setup is no sensor's gain: the turns show it, and nothing is blamed.
+/// A probe that slips in the middle of a setup is no sensor's gain: the turns show it, and it is attributed to no effect.
 #[test]
 fn a_probe_that_slips_within_a_setup_is_said_to_have() {
     let effect = r#"[{"plugin":"slipped-probe","targets":["S2"],"setup":"b","after_turns":31.4,"shift_um":0.7,

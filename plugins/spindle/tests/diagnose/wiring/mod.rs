@@ -278,7 +278,7 @@ fn what_was_recorded_twice_is_named() {
     names(&six(2, identical), &["sensors-identical S1 S2"], &[]);
 }
 
-/// The same file stored under two names: noise is the same too.
+/// One file is stored under two names: noise is the same too.
 #[test]
 fn a_recording_stored_twice_is_said_by_run() {
     let config = six(1, "[]");
@@ -309,7 +309,7 @@ fn sensors_turned_wrongly_in_a_setup_are_named() {
     }
 }
 
-/// Large effects and strangers are no mistakes in the rig file.
+/// Large effects and unmodelled disturbances are no mistakes in the rig file.
 #[test]
 fn nothing_else_is_taken_for_a_mistake() {
     for (index, effect) in [
