@@ -3,7 +3,6 @@
 
 mod areal;
 mod axis_motion;
-mod centres;
 mod circles;
 mod config;
 mod cylindricity;

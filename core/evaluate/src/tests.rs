@@ -632,6 +632,36 @@ fn intervals_of_positions_cover_the_true_value() {
     assert!(inside.iter().all(|(_, inside)| *inside >= least), "{inside:?} of {count}");
 }
 
+/// A section beside the axis of others by its noise, and by more.
+#[test]
+fn intervals_of_a_section_beside_its_axis_hold_from_zero_on() {
+    let (std, count) = (0.003, trials(40));
+    for beside_um in [0.003, 0.015] {
+        let mut random = ChaCha8Rng::seed_from_u64(7);
+        let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
+        let mut inside = [0_usize; 2];
+        for _ in 0..count {
+            let mut ring = |(z_mm, own_um): (f64, f64)| {
+                let centre = Complex64::new(own_um + std * normal(), std * normal());
+                station(z_mm, &[(1, centre), lobes(3, 1.5)], 10, 2.0 * std * std, &[])
+            };
+            let wall = [(0.0, 0.0), (5.0, 0.0), (10.0, beside_um), (15.0, 0.0), (20.0, 0.0)].map(&mut ring);
+            let found = part(&wall, true, "references = ['LSCI']\nfilter_upr = []\ndatum = ['s0', 's20']");
+            let of = |symbol: &str, of: &str| {
+                let is_it = |value: &&Value| value.symbol == symbol && value.reference.as_ref().unwrap().contains(of);
+                found.values.iter().find(is_it).unwrap().interval_95().unwrap()
+            };
+            let wanted = [("eccentricity", "of s10", beside_um), ("coaxiality", "axis of s0", 2.0 * beside_um)];
+            for (inside, (symbol, name, truth)) in inside.iter_mut().zip(wanted) {
+                let [low, high] = of(symbol, name);
+                *inside += usize::from((low..=high).contains(&truth));
+            }
+        }
+        println!("beside by {beside_um} µm: eccentricity and coaxiality within {inside:?} of {count}");
+        assert!(inside.iter().all(|inside| *inside >= fewest(count, [34, 40], 0.95)), "{beside_um}: {inside:?}");
+    }
+}
+
 /// Walls that are straight and parallel, and walls that are less and less so: the values grow with noise, and their intervals
 /// cover the true value.
 #[test]

@@ -189,16 +189,4 @@ impl Wall {
         let sections = self.rings.iter().zip(forms);
         sections.map(|(ring, form_um)| Section { z_mm: ring.z_mm, angles, form_um }).collect()
     }
-
-    /// Values of so many draws of the errors alone.
-    pub(super) fn of_noise<T>(&self, filter: &Filter, draws: usize, look: impl Fn(&[Section]) -> T) -> Vec<T> {
-        let Some(mut errors) = self.errors(filter) else { return Vec::new() };
-        let mut fourier = Fourier::new(self.count);
-        let mut drawn = vec![vec![0.0; self.count]; self.rings.len()];
-        let next = |_| {
-            errors.iter_mut().zip(&mut drawn).for_each(|(errors, drawn)| errors.fresh(&mut fourier, drawn));
-            look(&self.sections(&self.angles, &drawn))
-        };
-        (0..draws).map(next).collect()
-    }
 }
