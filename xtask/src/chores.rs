@@ -74,9 +74,10 @@ pub(crate) fn test(foreign_readers: bool, complete: bool) -> Outcome {
         examples_of_docs()?;
         package()?;
     }
-    clock.over(match complete {
-        true => "fuzzing, kills, examples of the docs and the Python package",
-        false => "examples of the docs and the Python package",
+    clock.over(if complete {
+        "fuzzing, kills, examples of the docs and the Python package"
+    } else {
+        "examples of the docs and the Python package"
     });
     say(&clock.text());
     if !foreign_readers {

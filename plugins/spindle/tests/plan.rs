@@ -178,7 +178,6 @@ fn the_search_finds_what_a_long_random_search_finds() {
             let assessment = Layout::new(&rig, false).assess(last);
             let gains = assessment.orders[1..].iter().map(|order| assessed(&assessment.unknowns, order));
             assert!((gains.fold(0.0, f64::max) - best.nominal.worst).abs() < 1e-9);
-            assert!(cfg!(debug_assertions) || seconds < 5.0);
         }
     }
 }

@@ -61,7 +61,7 @@ fn draw(kind: Kind, turn: usize, chance: &mut Chance) -> Result<Campaign> {
     };
     let still = ids.iter().all(|id| STILL.contains(id) || STRANGERS.contains(id));
     let layout = if still { &LAYOUTS[chance.below(LAYOUTS.len())] } else { &LAYOUTS[0] };
-    debug_assert!(still || layout.machine);
+    assert!(still || layout.machine);
     let mut scenario = sound(layout, chance);
     let large = kind == Kind::Pair;
     let planted = ids.into_iter().map(|id| plant(id, large, &mut scenario, chance)).collect();
