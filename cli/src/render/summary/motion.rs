@@ -1,6 +1,9 @@
 //! Error motion of the axis.
 
-use runout_core::{evaluate::Value, summary::StationSummary};
+use runout_core::{
+    evaluate::{Value, error_motion::MotionKind},
+    summary::StationSummary,
+};
 
 use super::{unit, with_uncertainty};
 use crate::render::{
@@ -9,7 +12,7 @@ use crate::render::{
     table::Table,
 };
 
-const KINDS: [&str; 3] = ["synchronous", "asynchronous", "total"];
+const KINDS: [MotionKind; 3] = [MotionKind::Synchronous, MotionKind::Asynchronous, MotionKind::Total];
 
 /// One row a direction, one column a kind of value: of a station with ±, of several from the lowest to the highest.
 pub(crate) fn section(page: &mut Page, stations: &[StationSummary]) {
@@ -31,9 +34,9 @@ pub(crate) fn section(page: &mut Page, stations: &[StationSummary]) {
         Some(line_deg) => direction.replace("along", &format!("along {line_deg}°")),
         None => direction.to_owned(),
     };
-    let mut table = Table::new(1, std::iter::once("").chain(KINDS));
+    let mut table = Table::new(1, std::iter::once("").chain(KINDS.map(MotionKind::name)));
     for (direction, unit) in &directions {
-        let cell = |kind: &str| {
+        let cell = |kind: MotionKind| {
             let found = values().filter(|value| parts(value) == (kind, direction.clone()));
             cell(&found.collect::<Vec<_>>())
         };
@@ -53,7 +56,7 @@ pub(crate) fn section(page: &mut Page, stations: &[StationSummary]) {
 
 /// Whether it is drawn about a centre.
 fn is_plot(value: &Value) -> bool {
-    !["asynchronous", "fundamental"].iter().any(|kind| value.symbol.starts_with(kind))
+    MotionKind::split(&value.symbol).is_some_and(|(kind, _)| kind.has_centre())
 }
 
 /// Whether it has no centre, or that of `first`.
@@ -66,19 +69,19 @@ fn is_axial(direction: &str) -> bool {
     ["axial", "face"].iter().any(|along| direction.starts_with(along))
 }
 
-/// Kind and direction: "synchronous", "radial x". The fundamental is synchronous motion at 1/rev.
-fn parts(value: &Value) -> (&str, String) {
-    let residual = value.symbol.strip_prefix("residual-");
-    let symbol = residual.unwrap_or(&value.symbol);
-    let (kind, direction) = symbol.split_once('-').unwrap_or((symbol, ""));
+/// Column and row: synchronous, "radial x". Residual and fundamental motion are rows of synchronous motion.
+fn parts(value: &Value) -> (MotionKind, String) {
+    let (kind, direction) = MotionKind::split(&value.symbol).unwrap_or((MotionKind::Synchronous, &value.symbol));
+    let name = direction.replace('-', " ");
     match kind {
         // Along the axis there are both: with the fundamental and without it.
-        _ if residual.is_some() && is_axial(direction) => {
-            let (direction, rms) = direction.strip_suffix("-rms").map_or((direction, ""), |one| (one, " rms"));
-            (kind, format!("{} residual{rms}", direction.replace('-', " ")))
+        MotionKind::ResidualSynchronous if is_axial(direction) => {
+            let (name, rms) = name.strip_suffix(" rms").map_or((name.as_str(), ""), |one| (one, " rms"));
+            (MotionKind::Synchronous, format!("{name} residual{rms}"))
         }
-        "fundamental" => ("synchronous", format!("{direction} fundamental")),
-        _ => (kind, direction.replace('-', " ")),
+        MotionKind::Fundamental => (MotionKind::Synchronous, format!("{name} fundamental")),
+        MotionKind::ResidualSynchronous => (MotionKind::Synchronous, name),
+        _ => (kind, name),
     }
 }
 

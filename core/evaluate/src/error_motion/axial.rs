@@ -9,8 +9,8 @@
 //! how the face was clamped, and is left out.
 
 use super::{
-    ErrorMotion, FINER,
-    names::{RESIDUAL, STANDARD, XYZ, centre_of_chart, described, fundamental_along, over, unit},
+    ErrorMotion, FINER, MotionKind,
+    names::{STANDARD, XYZ, centre_of_chart, described, fundamental_along, over, unit},
     polar::Synchronous,
     synchronous::Named,
     turns::{between_setups, bounded, of_all_turns, rms_about_mean, rms_across, root_mean_square, widest},
@@ -34,14 +34,16 @@ impl ErrorMotion<'_> {
         };
         let mut values = Vec::new();
         if let Some(whole) = from(1).filter(|plot| plot.lost.first() != Some(&1)) {
-            values.extend(self.synchronous("synchronous", WHOLE, direction, &whole, z_mm).into_iter().flatten());
+            values.extend(
+                self.synchronous(MotionKind::Synchronous, WHOLE, direction, &whole, z_mm).into_iter().flatten(),
+            );
             values.extend(self.total_axial(direction, &whole, spreads, z_mm).into_iter().flatten());
             values.extend(self.fundamental_axial(direction, &whole, z_mm));
         }
         if let Some(residual) = from(2) {
-            values.extend(
-                self.synchronous(RESIDUAL, WITHOUT_FUNDAMENTAL, direction, &residual, z_mm).into_iter().flatten(),
-            );
+            let kind = MotionKind::ResidualSynchronous;
+            values
+                .extend(self.synchronous(kind, WITHOUT_FUNDAMENTAL, direction, &residual, z_mm).into_iter().flatten());
         }
         values
     }
@@ -49,14 +51,14 @@ impl ErrorMotion<'_> {
     /// Range of what repeats, and its root mean square.
     fn synchronous(
         &self,
-        kind: &str,
+        kind: MotionKind,
         what: &str,
         direction: Direction,
         plot: &Synchronous,
         z_mm: f64,
     ) -> Option<[Value; 2]> {
         let id = self.id(direction);
-        let seed = draws::seed(&[self.station, &id, kind]);
+        let seed = draws::seed(&[self.station, &id, kind.name()]);
         let centre = centre_of_chart();
         let seen = plot.seen(centre, self.angles, plot.band[0], seed)?;
         let described = described_within(direction, plot, z_mm);

@@ -15,6 +15,7 @@
 //! Of an axis that was measured at standing positions, [`StandingMotion`] gives the synchronous values.
 
 mod axial;
+mod kind;
 mod names;
 mod plots;
 mod polar;
@@ -25,6 +26,7 @@ mod tests;
 mod turns;
 mod weakened;
 
+pub use kind::MotionKind;
 pub use names::{standing_symbols, symbols};
 pub use plots::{Spectrum, TurnsPlot};
 pub use polar::Centre;

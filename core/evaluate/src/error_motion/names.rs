@@ -1,6 +1,6 @@
 //! Symbols of error motion values, and what they are of in words.
 
-use super::Centre;
+use super::{Centre, MotionKind};
 use crate::{
     Value,
     known::{KnownValue, Referred},
@@ -22,17 +22,22 @@ const TILT: [&str; 4] = ["tilt-x", "tilt-y", "tilt-rotating", "tilt-along"];
 pub fn symbols(lines: &[Azimuth], faces: &[FacePlace]) -> Vec<KnownValue> {
     let chosen = |of: fn(Azimuth) -> Direction| lines.iter().map(move |line| chosen_id(of(*line)));
     let named = |names: [&'static str; 4]| names.into_iter().map(str::to_owned);
-    let radial = named(RADIAL).chain(chosen(Direction::Along)).map(|id| (id, "µm", "synchronous"));
-    let tilt = named(TILT).chain(chosen(Direction::TiltAlong)).map(|id| (id, "µrad", RESIDUAL));
+    let radial = named(RADIAL).chain(chosen(Direction::Along)).map(|id| (id, "µm", MotionKind::Synchronous));
+    let tilt = named(TILT).chain(chosen(Direction::TiltAlong)).map(|id| (id, "µrad", MotionKind::ResidualSynchronous));
     let mut known = Known::default();
     for (id, unit, synchronous) in radial.chain(tilt) {
-        known.both([synchronous, "total"], &id, unit, Referred::Centres);
-        known.both(["asynchronous"], &id, unit, Referred::Other);
+        known.both([synchronous, MotionKind::Total], &id, unit, Referred::Centres);
+        known.both([MotionKind::Asynchronous], &id, unit, Referred::Other);
         known.one(format!("total-{id}{WITH_FUNDAMENTAL}"), unit, Referred::Chart);
     }
     for id in along_axis(faces) {
-        known.both(["synchronous", RESIDUAL, "total"], &id, "µm", Referred::Chart);
-        known.both(["asynchronous"], &id, "µm", Referred::Other);
+        known.both(
+            [MotionKind::Synchronous, MotionKind::ResidualSynchronous, MotionKind::Total],
+            &id,
+            "µm",
+            Referred::Chart,
+        );
+        known.both([MotionKind::Asynchronous], &id, "µm", Referred::Other);
         known.one(format!("fundamental-{id}"), "µm", Referred::Chart);
     }
     known.with_fundamentals()
@@ -48,7 +53,7 @@ impl Known {
     }
 
     /// Peak to valley and root mean square of each kind.
-    fn both<const N: usize>(&mut self, kinds: [&str; N], id: &str, unit: &'static str, referred: Referred) {
+    fn both<const N: usize>(&mut self, kinds: [MotionKind; N], id: &str, unit: &'static str, referred: Referred) {
         for kind in kinds {
             self.one(format!("{kind}-{id}"), unit, referred);
             self.one(format!("{kind}-{id}-rms"), unit, referred);
@@ -75,13 +80,13 @@ pub fn standing_symbols(lines: &[Azimuth], faces: &[FacePlace]) -> Vec<KnownValu
     let mut known = Known::default();
     let fixed = |kind: &str| XYZ.map(|letter| format!("{kind}-{letter}"));
     for id in fixed("radial").into_iter().chain(lines.iter().map(|line| chosen_id(Direction::Along(*line)))) {
-        known.both(["synchronous"], &id, "µm", Referred::Centres);
+        known.both([MotionKind::Synchronous], &id, "µm", Referred::Centres);
     }
     for id in fixed("tilt").into_iter().chain(lines.iter().map(|line| chosen_id(Direction::TiltAlong(*line)))) {
-        known.both([RESIDUAL], &id, "µrad", Referred::Centres);
+        known.both([MotionKind::ResidualSynchronous], &id, "µrad", Referred::Centres);
     }
     for id in along_axis(faces) {
-        known.both(["synchronous", RESIDUAL], &id, "µm", Referred::Chart);
+        known.both([MotionKind::Synchronous, MotionKind::ResidualSynchronous], &id, "µm", Referred::Chart);
         known.one(format!("fundamental-{id}"), "µm", Referred::Chart);
     }
     known.with_fundamentals()
@@ -93,16 +98,14 @@ pub(super) type Letters = [char; 3];
 pub(super) const XYZ: Letters = ['x', 'y', 'z'];
 
 /// Kind of the synchronous values across the axis, and the kind in words.
-pub(super) fn kind_of(direction: Direction) -> (&'static str, &'static str) {
+pub(super) fn kind_of(direction: Direction) -> (MotionKind, &'static str) {
     if direction.is_tilt() {
-        (RESIDUAL, "residual synchronous error motion value")
+        (MotionKind::ResidualSynchronous, "residual synchronous error motion value")
     } else {
-        ("synchronous", "synchronous error motion value")
+        (MotionKind::Synchronous, "synchronous error motion value")
     }
 }
 
-/// Kind of the synchronous values of tilt.
-pub(super) const RESIDUAL: &str = "residual-synchronous";
 /// End of the symbols of total values with 1/rev. Their centre is that of the polar chart: any other moves with 1/rev.
 pub(super) const WITH_FUNDAMENTAL: &str = "-with-fundamental";
 

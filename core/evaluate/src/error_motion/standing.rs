@@ -4,11 +4,9 @@
 //! direction rotates.
 
 use super::{
-    Centre,
+    Centre, MotionKind,
     axial::{WHOLE, WITHOUT_FUNDAMENTAL},
-    names::{
-        RESIDUAL, centre_of_chart, described, fundamental_across, fundamental_along, kind_of, letter_id, place, unit,
-    },
+    names::{centre_of_chart, described, fundamental_across, fundamental_along, kind_of, letter_id, place, unit},
     polar::Synchronous,
     synchronous::Named,
 };
@@ -75,8 +73,8 @@ impl StandingMotion<'_> {
             let (kind, what) = kind_of(self.direction);
             return centres.iter().filter_map(|centre| self.about(*centre, 2, kind, what)).flatten().collect();
         }
-        let whole = self.about(centre_of_chart(), 1, "synchronous", WHOLE);
-        let residual = self.about(centre_of_chart(), 2, RESIDUAL, WITHOUT_FUNDAMENTAL);
+        let whole = self.about(centre_of_chart(), 1, MotionKind::Synchronous, WHOLE);
+        let residual = self.about(centre_of_chart(), 2, MotionKind::ResidualSynchronous, WITHOUT_FUNDAMENTAL);
         let fundamental = self.harmonics.get(1).map(|harmonic| {
             let value = 2.0 * harmonic.norm();
             let known = of_fundamental(value, self.variance.get(1).copied(), self.freedom);
@@ -85,11 +83,11 @@ impl StandingMotion<'_> {
         whole.into_iter().chain(residual).flatten().chain(fundamental).collect()
     }
 
-    fn about(&self, centre: Centre, lowest: usize, kind: &str, what: &str) -> Option<[Value; 2]> {
+    fn about(&self, centre: Centre, lowest: usize, kind: MotionKind, what: &str) -> Option<[Value; 2]> {
         let plot = Synchronous::fixed(lowest, self.harmonics, self.variance, self.freedom.round() as usize);
         let (id, described) = (self.id(), described(self.direction, self.z_mm, self.letters));
         let angles = (ANGLES_AN_ORDER * self.harmonics.len()).max(FEWEST_ANGLES);
-        let seed = draws::seed(&[self.of, &id, kind, centre.symbol()]);
+        let seed = draws::seed(&[self.of, &id, kind.name(), centre.symbol()]);
         let seen = plot.seen(centre, angles, lowest, seed)?;
         let named = Named { kind, what, id: &id, described: &described, unit: unit(self.direction), centre };
         Some(plot.values(&named, &seen))

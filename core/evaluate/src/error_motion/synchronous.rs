@@ -1,7 +1,7 @@
 //! Synchronous values of a plot about a centre: peak to valley and root mean square, with intervals without what noise adds to them.
 
 use super::{
-    Centre, FINER,
+    Centre, FINER, MotionKind,
     names::STANDARD,
     polar::{Synchronous, seen_from},
     turns::{bounded, rms_about_mean},
@@ -32,8 +32,7 @@ pub(super) struct AboutCentre {
 
 /// What synchronous values are called.
 pub(super) struct Named<'a> {
-    /// "synchronous", "residual-synchronous".
-    pub kind: &'a str,
+    pub kind: MotionKind,
     /// The kind in words.
     pub what: &'a str,
     /// The direction as symbols name it.

@@ -1,5 +1,6 @@
 //! Error motion values behind a low-pass, and below orders that are not there.
 
+use super::MotionKind;
 use crate::Value;
 use runout_draws::stands_out;
 use runout_turning::separation::Separation;
@@ -27,7 +28,7 @@ pub fn below_absent(mut values: Vec<Value>) -> Vec<Value> {
 }
 
 fn repeats(value: &Value) -> bool {
-    !value.symbol.starts_with("asynchronous")
+    MotionKind::split(&value.symbol).is_some_and(|(kind, _)| kind != MotionKind::Asynchronous)
 }
 
 /// Whether a motion stands out from its noise above an order.

@@ -14,6 +14,7 @@ use super::{
 };
 use crate::summary::Summary;
 use runout_error::Result;
+use runout_evaluate::error_motion::MotionKind;
 use runout_numerics::statistics::student_95;
 use runout_table::{
     Array, ColumnSpec, Figure, Float64Array, Measure, RecordBatch, TableSpec, numbers, numbers_or_null, texts,
@@ -22,8 +23,6 @@ use runout_turning::{profile::NEIGHBOURS, rig::Rig};
 
 /// Speeds that differ by less, as a share, are one.
 const VARIED: f64 = 0.02;
-/// Beginnings of the symbols of error motion.
-const ERROR_MOTION: [&str; 4] = ["synchronous-", "asynchronous-", "total-", "fundamental-"];
 /// Determinant of the directions of unit vectors below which they are one line.
 const ONE_LINE: f64 = 1e-3;
 
@@ -145,9 +144,8 @@ impl Speeds {
         let known = ["std", "low_95", "high_95"].map(number);
         let mut rows = Vec::new();
         for place in 0..values.num_rows() {
-            let is_motion = |symbol: &str| ERROR_MOTION.iter().any(|start| symbol.starts_with(start));
             let (Some(symbols), Some(recordings), Some(column)) = (symbols, recordings, column) else { break };
-            if !is_motion(symbols.value(place)) || column.is_null(place) {
+            if MotionKind::split(symbols.value(place)).is_none() || column.is_null(place) {
                 continue;
             }
             let recording = recordings.value(place).to_owned();
