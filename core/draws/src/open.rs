@@ -29,6 +29,9 @@ const FEWEST_DRAWS: usize = 50;
 const POINTS_DRAWN: usize = 4_000_000;
 /// Share of the positions at each end whose mean is the place of the line that is taken out.
 const END: usize = 50;
+/// A bow is certain as far as it is above so many of its standard deviations, which so many pairs of draws show.
+const BOW: f64 = 3.0;
+const DRAWS_OF_BOW: usize = 20;
 /// Share of the mean power of correlated noise that each wave of it has at least: a correlation that is cut off may have a spectrum below 0.
 const LEAST_POWER: f64 = 1e-3;
 
@@ -74,7 +77,9 @@ impl OpenErrors {
         }
         let mut closing = Closing::of(profile_um)?;
         let mut errors = ErrorDraws::of(self, seed);
-        let Closed { taken_um, harmonics } = closing.closed(profile_um);
+        let Closed { taken_um, harmonics, bow_um } = closing.closed(profile_um);
+        let uncertain_um = self.uncertain_bow_um(bow_um, seed, &mut closing);
+        let certain_um = closing.less_bow(&taken_um, uncertain_um);
         let variance = errors.variance(&mut closing);
         if variance.iter().skip(1).all(|variance| *variance <= 0.0) {
             return None;
@@ -90,19 +95,21 @@ impl OpenErrors {
         let draws = (POINTS_DRAWN / (4 * profile_um.len())).clamp(FEWEST_DRAWS, DRAWS);
         let [mut of_truth, mut of_again] = [Vec::new(), Vec::new()];
         for (form, Form { mean, spread }) in section.forms.iter().enumerate() {
-            let mut drawn = Closed { taken_um: taken_um.clone(), harmonics: mean.clone() };
+            let taken_um = if spread.is_some() { &taken_um } else { &certain_um };
+            let mut drawn = Closed { taken_um: taken_um.clone(), harmonics: mean.clone(), bow_um };
             look(&closing.opened(&drawn), emptied(&mut of_truth));
             for _ in 0..draws {
                 let [of_form, of_measurement] = errors.next().map(|errors_um| closing.closed(&errors_um));
                 if let Some(spread) = spread {
                     let of_orders = of_form.harmonics.iter().zip(spread).map(|(error, spread)| spread * error);
-                    drawn.taken_um = sum(&taken_um, &of_form.taken_um);
+                    drawn.taken_um = sum(taken_um, &of_form.taken_um);
                     drawn.harmonics = sum(mean, &of_orders.collect::<Vec<_>>());
                     look(&closing.opened(&drawn), emptied(&mut of_truth));
                 }
                 let again = Closed {
                     taken_um: sum(&drawn.taken_um, &of_measurement.taken_um),
                     harmonics: sum(&drawn.harmonics, &of_measurement.harmonics),
+                    bow_um,
                 };
                 look(&closing.opened(&again), emptied(&mut of_again));
                 for (sides, (truth, again)) in sides.iter_mut().zip(of_truth.iter().zip(&of_again)) {
@@ -112,6 +119,14 @@ impl OpenErrors {
         }
         let refuted = section.refutes_noise;
         Some(found.into_iter().zip(sides).map(|(found, sides)| Interval::of(found, found, sides, refuted)).collect())
+    }
+
+    /// What noise may have made of a bow.
+    fn uncertain_bow_um(&self, bow_um: f64, seed: u64, closing: &mut Closing) -> f64 {
+        let mut errors = ErrorDraws::of(self, crate::errors::another(seed, 0));
+        let each = (0..DRAWS_OF_BOW).flat_map(|_| errors.next().map(|errors_um| closing.closed(&errors_um).bow_um));
+        let std_um = (each.map(|bow_um| bow_um * bow_um).sum::<f64>() / (2 * DRAWS_OF_BOW) as f64).sqrt();
+        bow_um.clamp(-BOW * std_um, BOW * std_um)
     }
 
     /// Power of the correlated errors of variance 1 at a phase step per position, in that of independent ones.
@@ -134,6 +149,8 @@ fn sum<T: Copy + std::ops::Add<Output = T>>(one: &[T], other: &[T]) -> Vec<T> {
 struct Closed {
     taken_um: Vec<f64>,
     harmonics: Vec<Complex64>,
+    /// Of the part that does not close, the square of the place from −1 to 1.
+    bow_um: f64,
 }
 
 /// Makes profiles close on themselves: the parabola that fits best is taken out, and of the rest the line through its ends. Linear in the
@@ -180,7 +197,11 @@ impl Closing {
         let mut rest: Vec<f64> = profile_um.iter().zip(&taken_um).map(|(value, taken)| value - taken).collect();
         self.bridge(&mut rest);
         let harmonics = self.transformed(&rest);
-        Closed { taken_um, harmonics }
+        Closed { taken_um, harmonics, bow_um: parabola[2] }
+    }
+
+    fn less_bow(&self, taken_um: &[f64], bow_um: f64) -> Vec<f64> {
+        taken_um.iter().zip(&self.places).map(|(taken, place)| taken - bow_um * place * place).collect()
     }
 
     /// Straight lines across positions without a reading.

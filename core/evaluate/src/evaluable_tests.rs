@@ -28,6 +28,8 @@ enum Shape {
     Bow,
     /// All waves from 600 mm on, amplitudes falling with the power 1.5 of their number.
     Power,
+    /// None.
+    Line,
 }
 
 const SHAPES: [Shape; 3] = [Shape::Waves, Shape::Bow, Shape::Power];
@@ -59,6 +61,7 @@ fn truth(shape: Shape, seed: u64) -> Vec<f64> {
     let waves: Vec<(f64, f64, f64)> = match shape {
         Shape::Waves => [(1.5, 300.0), (0.8, 110.0), (0.4, 35.0), (0.1, 12.0)].map(|(a, l)| wave(a, l)).to_vec(),
         Shape::Bow => vec![wave(0.3, 90.0)],
+        Shape::Line => Vec::new(),
         Shape::Power => (1..=90).map(|n| wave(2.0 * f64::from(n).powf(-1.5), 600.0 / f64::from(n))).collect(),
     };
     let bow = |z: f64| match shape {
@@ -159,20 +162,24 @@ fn shares(shape: Shape, noise: Noise, std_um: f64, trials: u64, text: &str) -> S
 fn intervals_of_straightness_cover_the_true_value() {
     // From a noise far below the form to one as large.
     let noises = [
-        (Noise::Known, 0.01),
-        (Noise::Known, 0.5),
-        (Noise::Scatter, 0.02),
-        (Noise::Correlated, 0.02),
-        (Noise::Uneven, 0.05),
-        (Noise::Common, 0.05),
+        (Shape::Waves, Noise::Known, 0.01),
+        (Shape::Waves, Noise::Known, 0.5),
+        (Shape::Waves, Noise::Scatter, 0.02),
+        (Shape::Waves, Noise::Correlated, 0.02),
+        (Shape::Waves, Noise::Uneven, 0.05),
+        (Shape::Waves, Noise::Common, 0.05),
+        (Shape::Line, Noise::Known, 0.1),
+        (Shape::Line, Noise::Scatter, 0.1),
+        (Shape::Line, Noise::Common, 0.1),
     ];
-    for (noise, std_um) in noises {
-        let all = shares(Shape::Waves, noise, std_um, 60, "values = ['straightness']");
+    for (shape, noise, std_um) in noises {
+        let all = shares(shape, noise, std_um, 60, "values = ['straightness']");
         for (name, stated, inside) in all {
+            println!("{shape:?} {noise:?} {std_um} {name}: {inside} of {stated}");
             // 95 % of 60 are 57 ± 1.7; four of those below it.
             assert!(
                 stated > 50 && inside as f64 > 0.83 * stated as f64,
-                "{noise:?} {std_um} {name}: {inside} of {stated}"
+                "{shape:?} {noise:?} {std_um} {name}: {inside} of {stated}"
             );
         }
     }
