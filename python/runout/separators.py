@@ -492,8 +492,8 @@ class AsMeasured:
     """Form that is removed by least squares, of a height map or a profile; without it the plane, or the line of a profile."""
 
     max_order: Union[int, None] = None
-    """Highest order (undulations per revolution) that is fitted to each circle. Without it 500, or as many as leave a tenth of the
-    points, 10 at least, to show the noise."""
+    """Highest order (undulations per revolution) that is fitted to each circle. Without it 500, or less: half a wave is as long as
+    the arcs between points, and a tenth of the points, 10 at least, are left to show the noise."""
 
     object: Union[Union[Literal['height-map'], Literal['profile'], Literal['roundness'], Literal['cylinder']], None] = None
     """What the points are of; without it a height map."""

@@ -32,8 +32,8 @@ pub struct AsMeasuredConfig {
     /// Nominal radius of a circle or a cylinder, in mm; without it the mean radius where the points have one.
     #[serde(default)]
     pub radius_mm: Option<f64>,
-    /// Highest order (undulations per revolution) that is fitted to each circle. Without it 500, or as many as leave a tenth of the points, 10 at
-    /// least, to show the noise.
+    /// Highest order (undulations per revolution) that is fitted to each circle. Without it 500, or less: half a wave is as long as the arcs between
+    /// points, and a tenth of the points, 10 at least, are left to show the noise.
     #[serde(default)]
     pub max_order: Option<usize>,
 }

@@ -2,6 +2,7 @@
 
 use runout_core::{
     Error, ErrorKind, Result,
+    numerics::least_squares::Basis,
     points::{Column, Points, Trace},
 };
 use runout_cylinder::{LeastSquaresCylinder, LeastSquaresCylinderConfig};
@@ -52,21 +53,22 @@ pub(crate) fn circles(points: &Points, config: &AsMeasuredConfig) -> Result<(Poi
         let traces = points.traces.iter().map(|trace| Trace { kind: kind(trace), ..trace.clone() });
         ((0..angle_deg.len()).collect(), traces.collect())
     } else {
-        sections(&z_mm, radius_mm).map_err(|problem| refuse(problem).of(ErrorKind::UnsuitableData))?
+        sections(&angle_deg, &z_mm, radius_mm).map_err(|problem| refuse(problem).of(ErrorKind::UnsuitableData))?
     };
     if config.object == Object::Roundness && traces.len() > 1 {
         return Err(refuse(format!("it has {} circles", traces.len())).help("`object = \"cylinder\"` takes several"));
     }
     let sorted = |values: &[f64]| order.iter().map(|index| values[*index]).collect::<Vec<f64>>();
     let columns = [("angle_deg", sorted(&angle_deg)), ("z_mm", sorted(&z_mm)), ("deviation_um", sorted(&deviation_um))];
+    let usual = || traces.iter().map(|trace| usual_order(&columns[0].1[trace.points.clone()])).min().unwrap_or(ORDERS);
+    let max_order = config.max_order.unwrap_or_else(usual);
     let columns = columns.into_iter().map(|(name, values)| Column { name: name.into(), values });
-    let counts: Vec<usize> = traces.iter().map(|trace| trace.points.len()).collect();
     let placed = Points { columns: columns.collect(), traces, labels: Vec::new(), ..points.clone() };
     let separator = LeastSquaresCylinderConfig {
         radius_mm,
         used: None,
         hold_out: Vec::new(),
-        max_order: config.max_order.unwrap_or_else(|| usual_order(&counts)),
+        max_order,
         outlier_mad: config.outlier_mad,
         outlier_order: config.max_order.unwrap_or(50),
         max_lobes: 2,
@@ -81,15 +83,32 @@ const SPARE_PART: usize = 10;
 /// A quarter of the points is the highest order at least: then half of them are spare.
 const POINTS_AN_ORDER: usize = 4;
 
-/// The highest order where none is stated, of circles of so many points.
-fn usual_order(points: &[usize]) -> usize {
-    let fewest = points.iter().copied().min().unwrap_or(0);
-    let spared = fewest.saturating_sub(SPARE.max(fewest / SPARE_PART)) / 2;
-    spared.max(fewest / POINTS_AN_ORDER).clamp(2, ORDERS)
+/// An arc without a point is a gap where it is longer than so many times the next shorter arc.
+const GAP: f64 = 2.0;
+
+/// The highest order where none is stated, of a circle with points at these angles: half a wave is as long as the arcs between points.
+fn usual_order(angle_deg: &[f64]) -> usize {
+    let count = angle_deg.len();
+    let spared = count.saturating_sub(SPARE.max(count / SPARE_PART)) / 2;
+    let of_arcs = (180.0 / longest_arc_deg(angle_deg) + 1e-6) as usize;
+    spared.max(count / POINTS_AN_ORDER).min(of_arcs).clamp(2, ORDERS)
+}
+
+/// The longest arc between neighbouring points that is no gap; 0 of fewer than two points.
+fn longest_arc_deg(angle_deg: &[f64]) -> f64 {
+    let mut angles: Vec<f64> = angle_deg.iter().map(|angle| angle.rem_euclid(360.0)).collect();
+    angles.sort_by(f64::total_cmp);
+    let around = angles.first().map(|first| first + 360.0);
+    let next = angles.iter().copied().skip(1).chain(around);
+    let mut arcs: Vec<f64> = angles.iter().zip(next).map(|(from, to)| to - from).filter(|arc| *arc > 0.0).collect();
+    arcs.sort_by(f64::total_cmp);
+    let longer = &arcs[arcs.len() / 2..];
+    let gap = longer.windows(2).position(|pair| pair[1] > GAP * pair[0]);
+    longer.get(gap.unwrap_or(longer.len().saturating_sub(1))).copied().unwrap_or(0.0)
 }
 
 /// The order of the points by section, and a trace a section: circles at their heights, or all points as one circle or helix.
-fn sections(z_mm: &[f64], radius_mm: f64) -> std::result::Result<(Vec<usize>, Vec<Trace>), String> {
+fn sections(angle_deg: &[f64], z_mm: &[f64], radius_mm: f64) -> std::result::Result<(Vec<usize>, Vec<Trace>), String> {
     let mut order: Vec<usize> = (0..z_mm.len()).collect();
     let whole = |id: &str| Trace { id: id.into(), kind: "circle".into(), points: 0..z_mm.len() };
     let [low, high] =
@@ -118,8 +137,7 @@ fn sections(z_mm: &[f64], radius_mm: f64) -> std::result::Result<(Vec<usize>, Ve
     let mut traces = Vec::new();
     for pair in ends.windows(2) {
         let part = &mut order[pair[0]..pair[1]];
-        let span = z_mm[part[part.len() - 1]] - z_mm[part[0]];
-        if span > LEVEL.max(range / radius_mm / MOST_SECTIONS) * radius_mm {
+        if beside_a_plane_mm(part, angle_deg, z_mm) > LEVEL.max(range / radius_mm / MOST_SECTIONS) * radius_mm {
             let (low, high) = (z_mm[part[0]], z_mm[part[part.len() - 1]]);
             return Err(format!(
                 "heights from {low:.4} to {high:.4} mm are no circle: a column `trace` names the circles"
@@ -131,4 +149,14 @@ fn sections(z_mm: &[f64], radius_mm: f64) -> std::result::Result<(Vec<usize>, Ve
         traces.push(Trace { id: format!("z={mean:.3}"), kind: "circle".into(), points: pair[0]..pair[1] });
     }
     Ok((order, traces))
+}
+
+/// Range of the heights of some points beside the plane through them: a section at one height of the machine is a plane that leans to the axis.
+fn beside_a_plane_mm(part: &[usize], angle_deg: &[f64], z_mm: &[f64]) -> f64 {
+    let along = |of: fn(f64) -> f64| part.iter().map(|point| of(angle_deg[*point].to_radians())).collect::<Vec<f64>>();
+    let mut heights_mm: Vec<f64> = part.iter().map(|point| z_mm[*point]).collect();
+    Basis::of(vec![vec![1.0; part.len()], along(f64::cos), along(f64::sin)]).remove_from(&mut heights_mm);
+    let [low, high] =
+        heights_mm.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], z| [low.min(*z), high.max(*z)]);
+    high - low
 }

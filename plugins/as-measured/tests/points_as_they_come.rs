@@ -119,12 +119,40 @@ fn heights_are_sections_or_a_helix() {
     let three = of(120, 360, &|index| [5.0, 1.0, 9.0][index / 120] + 1e-4 * (index % 2) as f64).unwrap();
     assert_eq!(names(&three), ["z=1.000", "z=5.000", "z=9.000"]);
     near(&rons(&three), 5.0);
+    // A part that leans by 9 mrad: one height of the machine is a plane that leans to the axis.
+    let leaning =
+        of(120, 360, &|index| [5.0, 1.0, 9.0][index / 120] + 0.18 * (TAU * (index % 120) as f64 / 120.0).cos());
+    assert_eq!(names(&leaning.unwrap()), ["z=1.000", "z=5.000", "z=9.000"]);
     let helix = of(100, 500, &|index| 0.01 * index as f64).unwrap();
     assert!(names(&helix).iter().all(|name| name.contains("helix")), "{:?}", names(&helix));
     let scattered = of(100, 500, &|index| (index * 7919 % 500) as f64 * 0.01).unwrap_err();
     assert!(scattered.contains("scattered"), "{scattered}");
     let one = of(120, 120, &|_| 1.0).map(|summary| names(&summary));
     assert!(one.as_ref().is_ok_and(|names| *names == ["circle"]), "{one:?}");
+}
+
+/// 72 points whose arcs differ by a third have no gap; with a keyway of 20° they have one.
+#[test]
+fn uneven_points_are_no_gaps() {
+    let folder = tempfile::tempdir().unwrap();
+    let of = |keyway: bool| {
+        let mut text = String::from("angle_deg,radius_mm\n");
+        for index in 0..72 {
+            let angle = 5.0 * f64::from(index) + 1.5 * (7.0 * f64::from(index)).sin();
+            if keyway && (100.0..120.0).contains(&angle) {
+                continue;
+            }
+            let radius = 20.0 + 2.5e-3 * (2.0 * angle.to_radians()).cos();
+            writeln!(text, "{angle:.6},{radius:.7}").unwrap();
+        }
+        let summary = run(&written(folder.path(), "circle.csv", &text), "object = 'roundness'").unwrap();
+        let ront = summary.placed_values().into_iter().find(|placed| placed.value.symbol == "RONt").unwrap();
+        (ront.value.coverage, summary.warnings.iter().filter(|said| said.contains("left out of every value")).count())
+    };
+    let (all, none) = of(false);
+    assert!(all > 0.999 && none == 0, "{all} {none}");
+    let (most, one) = of(true);
+    assert!((0.9..0.96).contains(&most) && one == 1, "{most} {one}");
 }
 
 /// Normal enough: twelve uniform numbers.

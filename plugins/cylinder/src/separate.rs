@@ -34,6 +34,9 @@ use crate::{
     shape::Cylinder,
 };
 
+/// Gaps of a circle that are said one by one.
+const MOST_SAID: usize = 3;
+
 impl StageConfig for LeastSquaresCylinderConfig {
     type Stage = Separator;
 
@@ -216,9 +219,19 @@ impl LeastSquaresCylinder {
         let closes = if circle.window.is_none() { closes(&placed, &named) } else { None };
         let checks = unlike(&placed, &basis, &circle.scan, "the point").into_iter().chain(closes).collect();
         circle.warnings.extend(fit.limit.iter().map(|limit| format!("{named}: {limit}")));
-        for [from, to] in unseen(&placed, order).map(|ends| ends.map(f64::to_degrees)) {
-            let gap = format!("no point is used between {from:.2}° and {to:.2}°: it is left out of every value");
-            circle.warnings.push(format!("{named}: {gap}"));
+        let gaps: Vec<[f64; 2]> = unseen(&placed, order).map(|ends| ends.map(f64::to_degrees)).collect();
+        if gaps.len() > MOST_SAID {
+            let all: f64 = gaps.iter().map(|[from, to]| to - from).sum();
+            circle.warnings.push(format!(
+                "{named}: {} arcs, {all:.0}° in all, have no point and are longer than half a wave of order {order}: they are left out of every \
+                 value; a lower `max_order` has longer waves",
+                gaps.len()
+            ));
+        } else {
+            let gap = |[from, to]: &[f64; 2]| {
+                format!("{named}: no point is used between {from:.2}° and {to:.2}°: it is left out of every value")
+            };
+            circle.warnings.extend(gaps.iter().map(gap));
         }
         let orders = self.0.max_order + 1;
         let (mut estimate, mut variance) = (fit.coefficients, fit.variance);
