@@ -12,6 +12,9 @@ use runout_core::{
 
 use crate::{contrasts::TraceErrors, model::TracesFit, straightness::Straightness, trace::AxialTrace};
 
+/// Share of a trace's mean square that the others have at least: theirs is a difference of nearly equal numbers beside a much larger one.
+const LEAST_OF_OTHERS: f64 = 1e-3;
+
 /// Says that the setups, of these names, read the same: nothing shows the slide. `None` where something does, and where the noise is not known.
 pub(crate) fn not_reversed(found: &Straightness, [initial, reversed]: [&str; 2]) -> Option<String> {
     let power = |values: &[f64]| values.iter().map(|value| value * value).sum::<f64>();
@@ -94,7 +97,7 @@ impl TracesFit {
             squares.iter().zip(&data.setups).map(|(square, setup)| square * (1.0 - 1.0 / size(*setup))).sum();
         let others = [0, 1].iter().map(|setup| (size(*setup) - 1.0).max(0.0)).sum::<f64>() - 1.0;
         let judged = (0..traces.len()).filter(|trace| size(data.setups[*trace]) > 2.0).map(|trace| {
-            let ratio = squares[trace] * others / (all - squares[trace]).max(f64::MIN_POSITIVE);
+            let ratio = squares[trace] * others / (all - squares[trace]).max(LEAST_OF_OTHERS * squares[trace]);
             let independent = (traces[trace].len() as f64 - 2.0) * independent_share(&traces[trace]);
             let dof = [independent, others * independent];
             (trace, ratio, dof, (f_tail(ratio, dof[0], dof[1]) * traces.len() as f64).min(1.0))

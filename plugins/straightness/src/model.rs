@@ -110,6 +110,13 @@ impl Model for TracesModel {
         Ok(fit)
     }
 
+    fn is_possible(&self, effect: usize, values: &[f64]) -> bool {
+        let Some(candidate) = self.0.candidates.get(effect) else { return true };
+        let mut alone = Alteration::default();
+        alone.add(candidate.kind, values);
+        alone.beyond(self.0.max_shift_mm).is_none()
+    }
+
     /// A shift begins where the traces agree best among shifts a knot apart: features are narrow, so that the error has many
     /// minima. A drift begins with a usual time constant.
     fn start(&self, effect: usize, _fit: &TracesFit, applied: &[Setting]) -> Option<Vec<f64>> {

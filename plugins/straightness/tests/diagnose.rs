@@ -185,6 +185,23 @@ fn traces_that_lack_nothing_raise_no_alarm() {
     }
 }
 
+/// The traces agree better where their own waves meet, and best beyond the largest shift.
+#[test]
+fn a_wave_of_each_trace_is_no_shift() {
+    for seed in 0..trials(9) as u64 {
+        let mut campaign = ground(400 + seed, [3, 3]);
+        (campaign.noise_um, campaign.length_mm, campaign.step_mm) = (0.05, 300.0, 2.0);
+        campaign.part = vec![[1.2, 260.0, 0.7], [0.4, 90.0, 1.9], [0.15, 31.0, 0.2]];
+        campaign.slide = vec![[1.0, 300.0, 1.1], [0.5, 110.0, 2.5]];
+        for (trace, shot) in campaign.traces.iter_mut().enumerate() {
+            shot.own = vec![[0.1, 15.0, 2.4 * (7 * seed + trace as u64) as f64]];
+        }
+        let names = named(&diagnosed(&campaign, None).diagnosis);
+        println!("{seed}: {names:?}");
+        assert!(!names.iter().flatten().any(|name| name.starts_with("axial-registration")), "{seed}: {names:?}");
+    }
+}
+
 #[test]
 fn other_effects_of_one_trace_are_named() {
     let cases: [(&str, Shot); 3] = [

@@ -41,6 +41,8 @@ pub(crate) struct Shot {
     pub backwards: bool,
     /// A flagged stretch with a chip under the probe.
     pub chip: bool,
+    /// Waves that no other trace has, as of a drive whose phase is another one each time.
+    pub own: Waves,
 }
 
 pub(crate) fn value(waves: &Waves, z: f64) -> f64 {
@@ -96,7 +98,9 @@ impl Campaign {
                 walked +=
                     if self.walk_um > 0.0 { self.walk_um / self.noise_um * noise.sample(&mut random) } else { 0.0 };
                 z_mm.push(z);
-                reading_um.push((1.0 + shot.gain) * content + lifted + offset + slope * z + error + walked);
+                reading_um.push(
+                    (1.0 + shot.gain) * content + lifted + offset + slope * z + error + walked + value(&shot.own, z),
+                );
                 flag.push(f64::from(u8::from(chip)));
             }
             let kind = if shot.reversed { "reversed" } else { "initial" };
