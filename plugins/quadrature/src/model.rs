@@ -55,6 +55,9 @@ const PARTS: usize = 8;
 /// Blocks and orders beyond these say nothing more.
 const MOST_BLOCKS: usize = 1_000;
 const HIGHEST_ORDER: usize = 50;
+/// Of few samples there are fewer blocks than asked for.
+const SAMPLES_A_BLOCK: usize = 2;
+const FEWEST_BLOCKS: usize = 2;
 
 impl StageConfig for QuadratureConfig {
     type Stage = Separator;
@@ -124,10 +127,10 @@ impl LinearModel for Quadrature {
     fn terms(&self, points: &Points) -> Result<LinearTerms> {
         let samples = Samples::of(points)?;
         let count = samples.phase_rad.len();
-        if count < 2 * self.0.blocks {
-            let problem = format!("it has {count} samples for {} blocks", self.0.blocks);
-            let error = Error::new("fit", points.input.display().to_string(), problem).of(ErrorKind::InsufficientData);
-            return Err(error.help("ask for fewer `blocks`"));
+        let in_blocks = self.blocks_of(count);
+        if in_blocks < FEWEST_BLOCKS {
+            let problem = format!("expected at least {} samples, found {count}", FEWEST_BLOCKS * SAMPLES_A_BLOCK);
+            return Err(Error::new("fit", points.input.display().to_string(), problem).of(ErrorKind::InsufficientData));
         }
         let linearised = samples.linearised(self.0.max_order)?;
         let radius = linearised.radius;
@@ -157,12 +160,12 @@ impl LinearModel for Quadrature {
             .divided(name, Kind::Blocks, of_rows(of), numbered(part, PARTS))
             .naming((0..rows).map(|row| format!("sample {}", row % count)).collect());
         let observations = Observations {
-            group: of_rows(blocks(samples.angles(), self.0.blocks)),
+            group: of_rows(blocks(samples.angles(), in_blocks)),
             values,
             unit: UNIT.into(),
             std: None,
             std_dof: None,
-            groups: numbered("block", self.0.blocks),
+            groups: numbered("block", in_blocks),
             structure,
         };
         let highest = self.0.max_order;
@@ -180,11 +183,11 @@ impl LinearModel for Quadrature {
     fn outcome(&self, points: &Points, fit: &LinearFit) -> Result<Outcome> {
         let samples = Samples::of(points)?;
         let count = samples.phase_rad.len();
+        let in_blocks = self.blocks_of(count);
         let blocks = format!(
-            "left out one after the other: {} blocks of {} or {} samples next to each other in phase",
-            self.0.blocks,
-            count / self.0.blocks,
-            count.div_ceil(self.0.blocks)
+            "left out one after the other: {in_blocks} blocks of {} or {} samples next to each other in phase",
+            count / in_blocks,
+            count.div_ceil(in_blocks)
         );
         let correction = Correction::of(&samples, self.0.max_order, fit)?;
         let mut remarks = vec![blocks];
@@ -199,6 +202,13 @@ impl LinearModel for Quadrature {
             remarks,
             ..Outcome::default()
         })
+    }
+}
+
+impl Quadrature {
+    /// Blocks of so many samples: those that are asked for, where each has samples enough.
+    fn blocks_of(&self, samples: usize) -> usize {
+        self.0.blocks.min(samples / SAMPLES_A_BLOCK)
     }
 }
 

@@ -96,6 +96,22 @@ fn known_errors_are_found_again() {
     }
 }
 
+/// Fewer samples than the usual blocks would take have fewer blocks.
+#[test]
+fn sixty_samples_are_enough() {
+    let file = made([3.0, -2.0], 1.012, 0.008);
+    let rows: Vec<String> = std::fs::read_to_string(file.path()).unwrap().lines().map(str::to_owned).collect();
+    let step = (rows.len() - 1) / 60;
+    let few = tempfile::NamedTempFile::new().unwrap();
+    let kept = rows.iter().skip(1).step_by(step).take(60);
+    let kept: Vec<&str> = std::iter::once(&rows[0]).chain(kept).map(String::as_str).collect();
+    std::fs::write(few.path(), kept.join("\n")).unwrap();
+    assert!(!diagnosed(few.path()).added.is_empty());
+    std::fs::write(few.path(), rows[..4].join("\n")).unwrap();
+    let refused = diagnose(&pipeline(&text(few.path())), None, &Silent).unwrap_err().to_string();
+    assert!(refused.contains("at least 4 samples, found 3"), "{refused}");
+}
+
 #[test]
 fn a_clean_circle_needs_nothing() {
     let found = diagnosed(made([0.0, 0.0], 1.0, 0.0).path());
