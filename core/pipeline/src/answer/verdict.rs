@@ -2,6 +2,7 @@
 
 use crate::summary::{Decision, Limit, LimitSummary, LimitValue, Summary};
 use runout_closed_loop::diagnosis::{self, Diagnosis};
+use runout_consistency::Test;
 use runout_numerics::number::{significant, spread, unit_text};
 
 /// A sentence, and how good what it says is.
@@ -85,7 +86,19 @@ fn of_data(summary: &Summary) -> (String, Judgement) {
         Some([low, _, high]) => {
             let [low, high] = [low, high].map(|chi2| significant(chi2, 2));
             let range = if low == high { low } else { format!("{low} to {high}") };
-            (format!("The residual agrees with the measured noise: χ² per degree of freedom {range}"), Judgement::Good)
+            let unlike =
+                summary.consistency.iter().any(|check| check.test == Test::Residual && !check.finding.is_empty());
+            if unlike {
+                (
+                    format!("The residual is less than the stated noise: χ² per degree of freedom {range}"),
+                    Judgement::Open,
+                )
+            } else {
+                (
+                    format!("The residual agrees with the measured noise: χ² per degree of freedom {range}"),
+                    Judgement::Good,
+                )
+            }
         }
         None if summary.consistency.iter().any(|check| check.dof.iter().any(|dof| *dof > 0.0)) => {
             let findings = summary.consistency.iter().filter(|check| !check.finding.is_empty()).count();
