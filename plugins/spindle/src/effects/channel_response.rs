@@ -86,7 +86,7 @@ impl ChannelResponse {
             low_pass("filter-attenuation-bessel-4", "a Bessel low-pass of fourth order in one channel", BESSEL_4),
             of("channel-delay", "a channel is later than the others", ActsOn::Sensor, Response::Delay(1.0)),
             of("channel-skew", "each channel is later than the one before it", ActsOn::Rig, Response::Delay(1.0)),
-            of("index-offset", "the mark of a setup is at another angle", ActsOn::LaterSetup, Response::Delay(-1.0)),
+            of("index-offset", "the mark of a setup is at another angle", ActsOn::OddSetup, Response::Delay(-1.0)),
             of("sensor-gain", "a sensor's gain differs in one setup", ActsOn::SensorInSetup, Response::Gain),
             of("setup-gain", "all readings of a setup are too large by a factor", ActsOn::Setup, Response::Gain),
         ]
@@ -97,7 +97,7 @@ impl ChannelResponse {
     fn only(&self, target: usize, setups: usize) -> [Option<usize>; 2] {
         match self.acts_on {
             ActsOn::Sensor => [Some(target), None],
-            ActsOn::Setup | ActsOn::LaterSetup => [None, Some(target)],
+            ActsOn::Setup | ActsOn::OddSetup => [None, Some(target)],
             ActsOn::SensorInSetup => [Some(target / setups), Some(target % setups)],
             _ => [None, None],
         }

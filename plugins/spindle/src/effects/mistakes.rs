@@ -84,7 +84,7 @@ impl Mistake {
     pub fn acts_on(self) -> ActsOn {
         match self {
             Self::SensorSign | Self::SensorOpposite | Self::SensorInOtherSection => ActsOn::Sensor,
-            Self::SensorsTurned => ActsOn::LaterSetup,
+            Self::SensorsTurned => ActsOn::OddSetup,
             Self::SensorSignInSetup => ActsOn::SensorInSetup,
             Self::SensorsSwappedInSetup => ActsOn::SensorPairInSetup,
             Self::RotationReversedInSetup => ActsOn::Setup,

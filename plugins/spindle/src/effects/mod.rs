@@ -189,8 +189,8 @@ pub enum ActsOn {
     SensorPairInSetup,
     /// Any setup.
     Setup,
-    /// Any setup but the first, which the others are counted from.
-    LaterSetup,
+    /// A setup unlike all others: of two the second, which counts from the first; of more, any.
+    OddSetup,
     /// Any two setups: the target is first · (number of setups) + second.
     SetupPair,
     /// Any two setups, in either order.
@@ -214,7 +214,7 @@ impl ActsOn {
             Self::SensorPair => pairs(sensors).collect(),
             Self::SensorCopy => ordered_pairs(sensors).collect(),
             Self::Setup => (0..setups).collect(),
-            Self::LaterSetup => (1..setups).collect(),
+            Self::OddSetup => (usize::from(setups < 3)..setups).collect(),
             Self::SetupPair => pairs(setups).collect(),
             Self::SetupCopy => ordered_pairs(setups).collect(),
             Self::Rig => vec![0],
@@ -235,7 +235,7 @@ impl ActsOn {
                 let pair = pair_of(target / setups, sensors).map(sensor);
                 pair.into_iter().chain([setup(target % setups)]).collect()
             }
-            Self::Setup | Self::LaterSetup => vec![setup(target)],
+            Self::Setup | Self::OddSetup => vec![setup(target)],
             Self::SetupPair | Self::SetupCopy => pair_of(target, setups).map(setup).to_vec(),
             Self::Rig => Vec::new(),
         }

@@ -70,7 +70,7 @@ impl SpindleEffect for OfOrder {
         let (id, does, acts_on) = match self.kind {
             Kind::Chuck => ("chuck-form", "a form turns with the spindle and not with the part", ActsOn::Rig),
             Kind::Clamping => {
-                ("clamping-form", "the part has another form as it is clamped in one setup", ActsOn::LaterSetup)
+                ("clamping-form", "the part has another form as it is clamped in one setup", ActsOn::OddSetup)
             }
             Kind::RunOut => {
                 ("electrical-run-out", "a sensor reads a pattern of the part that is no form", ActsOn::Sensor)
@@ -81,7 +81,7 @@ impl SpindleEffect for OfOrder {
                 ActsOn::Sensor,
             ),
             Kind::Motion => {
-                ("setup-motion-order", "the spindle moves otherwise in one setup, at one order", ActsOn::LaterSetup)
+                ("setup-motion-order", "the spindle moves otherwise in one setup, at one order", ActsOn::OddSetup)
             }
         };
         let both = |prefix: &str| ["cosine", "sine"].map(|part| parameter(&format!("{prefix}{part}"), "um", 0.1));

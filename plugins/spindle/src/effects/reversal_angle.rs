@@ -13,7 +13,7 @@ impl SpindleEffect for ReversalAngle {
         About {
             id: "reversal-angle",
             does: "the part was clamped at another angle",
-            acts_on: ActsOn::LaterSetup,
+            acts_on: ActsOn::OddSetup,
             parameters,
         }
     }

@@ -12,7 +12,7 @@ impl SpindleEffect for SensorsAngle {
         About {
             id: "sensors-angle",
             does: "all sensors are at another angle in one setup",
-            acts_on: ActsOn::LaterSetup,
+            acts_on: ActsOn::OddSetup,
             parameters: vec![parameter("angle", "deg", 0.3)],
         }
     }

@@ -14,7 +14,7 @@ impl SpindleEffect for SetupMotionChange {
         About {
             id: "setup-motion-change",
             does: "the spindle moved more or less in one setup",
-            acts_on: ActsOn::LaterSetup,
+            acts_on: ActsOn::OddSetup,
             parameters,
         }
     }
