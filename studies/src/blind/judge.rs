@@ -201,7 +201,7 @@ fn form_errors(said: &StationDiagnosis, sound: &[Separation], truth: &StationTru
             let (Some(a), Some(b), Some(c)) = (index(sound), index(before), index(after)) else { continue };
             let found = [sound.estimate[a], before.estimate[b], after.estimate[c]];
             let errors = found.map(|value| (value - harmonics.get(order).copied().unwrap_or_default()).norm_sqr());
-            let variance = after.variance[c];
+            let variance = after.variance_of(c);
             for (sum, square) in squares.iter_mut().zip(errors.into_iter().chain([variance])) {
                 *sum += 0.5 * square / truth.form_um.len() as f64;
             }
@@ -227,7 +227,7 @@ fn motion_ratio(said: &StationDiagnosis, truth: &StationTruth) -> f64 {
             if after.observable.get(index).is_some_and(|observable| *observable) {
                 let truth = harmonics.get(order).copied().unwrap_or_default().conj();
                 error += (after.estimate[index] - truth).norm_sqr();
-                stated += after.variance[index];
+                stated += after.variance_of(index);
             }
         }
         (stated > 0.0).then(|| (error / stated).sqrt())
