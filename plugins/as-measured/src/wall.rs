@@ -60,7 +60,8 @@ pub(crate) fn circles(points: &Points, config: &AsMeasuredConfig) -> Result<(Poi
     }
     let sorted = |values: &[f64]| order.iter().map(|index| values[*index]).collect::<Vec<f64>>();
     let columns = [("angle_deg", sorted(&angle_deg)), ("z_mm", sorted(&z_mm)), ("deviation_um", sorted(&deviation_um))];
-    let usual = || traces.iter().map(|trace| usual_order(&columns[0].1[trace.points.clone()])).min().unwrap_or(ORDERS);
+    let around = || traces.iter().filter(|trace| trace.kind == "circle");
+    let usual = || around().map(|trace| usual_order(&columns[0].1[trace.points.clone()])).min().unwrap_or(ORDERS);
     let max_order = config.max_order.unwrap_or_else(usual);
     let columns = columns.into_iter().map(|(name, values)| Column { name: name.into(), values });
     let placed = Points { columns: columns.collect(), traces, labels: Vec::new(), ..points.clone() };
