@@ -87,12 +87,12 @@ const POINTS_AN_ORDER: usize = 4;
 /// An arc without a point is a gap where it is longer than so many times the next shorter arc.
 const GAP: f64 = 2.0;
 
-/// The highest order where none is stated, of a circle with points at these angles: half a wave is as long as the arcs between points.
+/// The highest order where none is stated, of a circle with points at these angles: half a wave is longer than the arcs between points.
 fn usual_order(angle_deg: &[f64]) -> usize {
     let count = angle_deg.len();
     let spared = count.saturating_sub(SPARE.max(count / SPARE_PART)) / 2;
-    let of_arcs = (180.0 / longest_arc_deg(angle_deg) + 1e-6) as usize;
-    spared.max(count / POINTS_AN_ORDER).min(of_arcs).clamp(2, ORDERS)
+    let of_arcs = (180.0 / longest_arc_deg(angle_deg) - 1e-6).ceil() as usize;
+    spared.max(count / POINTS_AN_ORDER).min(of_arcs.saturating_sub(1)).clamp(2, ORDERS)
 }
 
 /// The longest arc between neighbouring points that is no gap; 0 of fewer than two points.

@@ -90,7 +90,7 @@ fn of_data(summary: &Summary) -> (String, Judgement) {
                 summary.consistency.iter().any(|check| check.test == Test::Residual && !check.finding.is_empty());
             if unlike {
                 (
-                    format!("The residual is less than the stated noise: χ² per degree of freedom {range}"),
+                    format!("The residual is less than the measured noise: χ² per degree of freedom {range}"),
                     Judgement::Open,
                 )
             } else {
